@@ -1,0 +1,168 @@
+"""A verdict beside its truth. A measured drive has faults of its own: what its clean verdict says is not counted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from aqualog.model.effects import EFFECTS
+from tests.blind.judging.answers import Answer, Form, coordinates_of, judged_by, mechanism_of, twins_of
+from tests.blind.metrics.measure import right_first, right_or_listed
+from tests.blind.metrics.rows import Fact, Row, Said
+
+__all__ = ["Judged", "beyond", "facts_of", "judge"]
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """`row` for the figures that blind drives share; `chances`: (probability, whether it was so) of each cause and form.
+
+    `is_baseline`: a measured drive with nothing added, with no truth but itself.
+    """
+
+    row: Row
+    world: str
+    kind: str
+    forms: tuple[Form, ...] = ()
+    unknown: Mapping[str, Any] | None = None
+    chances: tuple[tuple[float, bool], ...] = ()
+    gain_low: float = math.nan
+    is_baseline: bool = False
+
+    @property
+    def in_answer(self) -> bool:
+        """All that is hidden is named or left open."""
+        return right_or_listed(self.row)
+
+    @property
+    def first_is_right(self) -> bool:
+        return right_first(self.row)
+
+    @property
+    def is_right_or_twins(self) -> bool:
+        """Named rightly, or a set that is what is hidden and its twins, and nothing else."""
+        row = self.row
+        if row.verdict in ("named", "compound"):
+            return set(row.names) == set(row.hidden)
+        allowed = {f.effect for f in row.truth}.union(*(twins_of(f.effect) for f in row.truth)) if row.truth else set()
+        said = {c.effect for c in row.causes}
+        return row.verdict == "cannot_tell" and self.in_answer and said <= allowed
+
+    @property
+    def form_is_right(self) -> bool:
+        """The most probable form acts by the right mechanism over the right coordinates."""
+        return self._form(exact=True)
+
+    @property
+    def form_is_near(self) -> bool:
+        """... by the right mechanism, over one of the right coordinates at least."""
+        return self._form(exact=False)
+
+    def _form(self, *, exact: bool) -> bool:
+        if self.unknown is None or not self.forms or self.row.verdict != "unexplained":
+            return False
+        first = max(self.forms, key=lambda f: f.probability if math.isfinite(f.probability) else -1.0)
+        return _fits(first, self.unknown, exact=exact)
+
+
+def _fits(form: Form, unknown: Mapping[str, Any], *, exact: bool) -> bool:
+    right = [coordinates_of(unknown["depends_on"]), *(coordinates_of(x) for x in unknown.get("also") or ())]
+    over = form.depends_on in right if exact else any(form.depends_on & r for r in right)
+    return over and mechanism_of(unknown["mechanism"]) in form.mechanisms
+
+
+def facts_of(truth: Mapping[str, Any]) -> tuple[Fact, ...]:
+    """Hidden effects; a size that is not known counts as strong."""
+    return tuple(
+        Fact(
+            *judged_by(e["effect"], e["where"]), dict(e["parameters"]), known=e["effect"] in EFFECTS,
+            z=math.inf if e["detectability"] is None else float(e["detectability"]),
+        )
+        for e in truth["effects"]
+    )  # fmt: skip
+
+
+def beyond(answer: Answer, clean: Answer, facts: tuple[Fact, ...]) -> tuple[Answer, tuple[Fact, ...]]:
+    """The answer without what the clean drive's says as well, and the truth as it stands in this drive.
+
+    A hidden effect that the clean drive has by itself counts as found where its value moved by more than half of what was
+    added; its true value is that of the clean verdict and what was added.
+    """
+    own = {c.key: c for c in clean.causes}
+    sized = {f.key: _with_own(f, own[f.key]) if f.key in own else f for f in facts}
+    kept = []
+    for cause, chance in zip(answer.causes, answer.probability, strict=True):
+        before, fact = own.get(cause.key), sized.get(cause.key)
+        if before is None or (fact is not None and _moved(cause, before, fact)):
+            kept.append((cause, chance))
+    forms = tuple(f for f in answer.forms if not any(_alike(f, old) for old in clean.forms))
+    verdict = answer.verdict
+    if verdict in ("named", "compound", "cannot_tell") and not kept:
+        verdict = "no_effect"
+    elif verdict in ("named", "compound"):
+        verdict = "named" if len(kept) == 1 else "compound"
+    elif verdict == "unexplained" and not forms:
+        verdict = "no_effect"
+    new = replace(
+        answer, verdict=verdict, causes=tuple(c for c, _ in kept), probability=tuple(p for _, p in kept), forms=forms
+    )
+    return new, tuple(sized[f.key] for f in facts)
+
+
+def _alike(a: Form, b: Form) -> bool:
+    return a.depends_on == b.depends_on and bool(set(a.mechanisms) & set(b.mechanisms))
+
+
+def _neutral(effect: str, name: str) -> float:
+    known = {p.name: p.neutral for p in EFFECTS[effect].parameters} if effect in EFFECTS else {}
+    return float(known.get(name, 0.0))
+
+
+def _with_own(fact: Fact, own: Said) -> Fact:
+    values = dict(fact.values)
+    for name, x in fact.values.items():
+        if name in own.values:
+            before = own.values[name][0]
+            values[name] = x * before if _neutral(fact.effect, name) == 1.0 else x + before
+    return replace(fact, values=values)
+
+
+def _moved(cause: Said, before: Said, fact: Fact) -> bool:
+    shared = [n for n in fact.values if n in cause.values and n in before.values]
+    if not shared:
+        return False
+    name = shared[0]
+    added = fact.values[name] - before.values[name][0]  # the fact holds the sum already
+    return (cause.values[name][0] - before.values[name][0]) * math.copysign(1.0, added) > 0.5 * abs(added)
+
+
+def judge(
+    key: str, answer: Answer, truth: Mapping[str, Any], *, clean: Answer | None = None,
+    cost: Mapping[str, float] | None = None,
+) -> Judged:  # fmt: skip
+    """One case: `clean` is the verdict on the same drive without the effects, where that drive was measured."""
+    facts = facts_of(truth)
+    if clean is not None:
+        answer, facts = beyond(answer, clean, facts)
+    told = [answer.told.get(f.key, math.nan) for f in facts]
+    facts = tuple(replace(f, p_right=p) for f, p in zip(facts, told, strict=True))
+    used = cost or {}
+    row = Row(
+        key, truth["kind"], truth["drive_type"], truth["noise"], truth["seed"], truth=facts, causes=answer.causes,
+        verdict="" if answer.error else answer.verdict, alternatives=answer.alternatives, p_value=answer.p_value,
+        limits=answer.limits, separation=truth.get("separation", 1.0), gain=answer.gain, worse=answer.worse,
+        oracle=truth.get("oracle_gain", math.nan), error=answer.error,
+        **{n: used.get(n, math.nan) for n in ("seconds", "cpu_seconds", "peak_mb")},
+    )  # fmt: skip
+    causes = zip(answer.causes, answer.probability, strict=True)
+    chances = [(p, c.key in row.hidden) for c, p in causes if math.isfinite(p)]
+    unknown = truth["unknown"]
+    for f in answer.forms:
+        if math.isfinite(f.probability):
+            chances.append((f.probability, unknown is not None and _fits(f, unknown, exact=True)))
+    return Judged(
+        row, truth["world"], truth["kind"], answer.forms, unknown, tuple(chances), answer.gain_low,
+        is_baseline=bool(truth.get("is_baseline")),
+    )  # fmt: skip

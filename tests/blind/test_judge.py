@@ -1,0 +1,189 @@
+"""The scorer of sealed cases, on verdicts made by hand: it counts what is right, wrong, left open, and not counted."""
+
+import json
+import math
+
+import pytest
+
+from tests.blind import judge as command
+from tests.blind.judging import figures as made
+from tests.blind.judging.answers import read_answer, twins_of
+from tests.blind.judging.cases import judge
+from tests.blind.judging.run import Place, diagnose_all, places
+from tests.blind.sealed import seal
+
+
+def cause(effect, value=0.0, where=None, probability=None, parameter="x"):
+    values = {parameter: {"value": value, "ci95": [value - 1.0, value + 1.0], "unit": "-"}}
+    return {"effect": effect, "where": where, "parameters": values, "probability": probability}
+
+
+def document(verdict, *causes, **more):
+    return {"verdict": verdict, "causes": list(causes), "alternatives": [], "unexplained": [], **more}
+
+
+def truth(kind="known", *hidden, z=10.0, **more):
+    effects = [{"effect": e, "where": w, "parameters": {p: v}, "detectability": z} for e, w, p, v in hidden]
+    return {
+        "world": "hand", "seed": 1, "kind": kind, "drive_type": "mixed", "noise": "white", "unknown": None, "effects": effects, **more,
+    }  # fmt: skip
+
+
+MASS = ("payload_mass", None, "delta_mass", 100.0)
+
+
+def judged(verdict, hidden, clean=None):
+    return judge("c", read_answer(verdict), hidden, clean=None if clean is None else read_answer(clean))
+
+
+def measured(cases):
+    return {m.name.strip(): (m.count, m.value) for m in made.figures(cases)}
+
+
+def test_right_name_true_twins_and_wrong_name():
+    right = judged(document("named", cause("payload_mass", 100.0, parameter="delta_mass")), truth("known", MASS))
+    twins = judged(document("cannot_tell", cause("torque_gain"), cause("payload_mass")), truth("known", MASS))
+    loose = judged(document("cannot_tell", cause("tone_ring"), cause("payload_mass")), truth("known", MASS))
+    wrong = judged(document("named", cause("torque_gain")), truth("known", MASS))
+    silent = judged(document("no_effect"), truth("known", MASS))
+    crashed = judged({"verdict": "failed", "error": "ended with -9"}, truth("known", MASS))
+    every = [right, twins, loose, wrong, silent, crashed]
+    assert [c.is_right_or_twins for c in every] == [True, True, False, False, False, False]
+    assert [c.in_answer for c in every] == [True, True, True, False, False, False]
+    got = measured(every)
+    assert got["right name first, z >= 8"] == (6, pytest.approx(1 / 6))
+    assert got["truth in the answer"] == (6, 0.5)
+    assert got["confidently wrong, z >= 8"] == (6, pytest.approx(1 / 6))
+    assert got["one name given, z >= 8"] == (6, pytest.approx(2 / 6))
+    assert got["true value within the 95 % interval"] == (1, 1.0)
+    assert got["cases that failed"] == (6, pytest.approx(1 / 6))
+
+
+def test_relations_that_are_exact_are_twins_either_way():
+    assert {"road_grade", "rolling_resistance"} <= twins_of("accelerometer_bias")
+    assert "payload_mass" in twins_of("trailer")
+    assert "trailer" in twins_of("payload_mass")
+
+
+def test_nulls_and_weak_effects():
+    quiet, loud = (
+        judged(document("no_effect"), truth("null")),
+        judged(document("named", cause("head_wind")), truth("null")),
+    )
+    limits = {"detection_limits": {"payload_mass": "120 kg"}}
+    seen = judged(document("no_effect", **limits), truth("known", MASS, z=4.0))
+    over = judged(document("no_effect", detection_limits={"payload_mass": "80 kg"}), truth("known", MASS, z=4.0))
+    got = measured([quiet, loud, seen, over])
+    assert got["false discovery, nothing hidden"] == (2, 0.5)
+    assert got["noise white"] == (2, 0.5)
+    assert got["confidently wrong at z 3 ... 5"] == (2, 0.0)
+    assert got["no effect, and the limit holds the truth"] == (2, 0.5)
+
+
+def test_compound_set():
+    hidden = truth("compound", MASS, ("aero_drag", None, "delta_drag_area", 0.1))
+    exact = judged(document("compound", cause("aero_drag"), cause("payload_mass")), hidden)
+    more = judged(document("compound", cause("aero_drag"), cause("payload_mass"), cause("tone_ring")), hidden)
+    half = judged(document("named", cause("aero_drag")), hidden)
+    got = measured([exact, more, half])
+    assert got["exact set of two"] == (3, pytest.approx(1 / 3))
+    assert got["a false member"] == (3, pytest.approx(1 / 3))
+    assert got["members recalled"] == (6, pytest.approx(5 / 6))
+
+
+def form(mechanism, *over, probability=0.9):
+    return {"channel": "force_balance", "mechanism": mechanism, "depends_on": list(over), "probability": probability}
+
+
+def test_unknown_form_needs_mechanism_and_coordinate():
+    hidden = truth(
+        "unknown", unknown={"mechanism": "force", "depends_on": ["v_x"], "kind": "hump", "held_back": True}
+    )  # fmt: skip
+    right = judged(document("unexplained", unexplained=[form("force on the car", "speed")]), hidden)
+    second = judged(
+        document("unexplained", unexplained=[form("force", "t", probability=0.2), form("force", "v_x")]), hidden
+    )
+    coordinate = judged(document("unexplained", unexplained=[form("force", "position")]), hidden)
+    mechanism = judged(document("unexplained", unexplained=[form("slip of an axle", "v_x")]), hidden)
+    channel = judged(document("unexplained", unexplained=[{"channel": "force_balance", "depends_on": ["v_x"]}]), hidden)
+    named = judged(document("named", cause("aero_drag")), hidden)
+    every = [right, second, coordinate, mechanism, channel, named]
+    assert [c.form_is_right for c in every] == [True, True, False, False, True, False]
+    got = measured(every)
+    assert got["unexplained"] == (6, pytest.approx(5 / 6))
+    assert got["with the right mechanism and coordinate"] == (6, 0.5)
+    assert got["misnamed"] == (6, pytest.approx(1 / 6))
+    assert got["hump, held back"] == (6, 0.5)
+
+
+def test_what_the_clean_drive_says_is_not_counted():
+    late = cause("signal_delay", 0.03, "torque", parameter="delay")
+    clean = document("named", late)
+    null = judged(document("named", late), truth("null"), clean)
+    assert null.row.verdict == "no_effect"
+    load = cause("payload_mass", 100.0, parameter="delta_mass")
+    beside = judged(document("compound", late, load), truth("known", MASS), clean)
+    assert (beside.row.verdict, beside.row.names, beside.first_is_right) == ("named", ("payload_mass",), True)
+    # the same effect again: found only if its value moved, and its true value is the sum
+    more = truth("known", ("signal_delay", "torque", "delay", 0.1))
+    assert not judged(document("named", late), more, clean).in_answer
+    moved = judged(document("named", cause("signal_delay", 0.12, "torque", parameter="delay")), more, clean)
+    assert moved.first_is_right
+    assert moved.row.truth[0].values["delay"] == pytest.approx(0.13)
+    shape = document("unexplained", unexplained=[form("force", "v_x")])
+    assert judged(shape, truth("null"), shape).row.verdict == "no_effect"
+
+
+def test_probabilities_are_judged():
+    cases = [judged(document("named", cause("payload_mass", probability=0.9)), truth("known", MASS)) for _ in range(9)]
+    cases += [judged(document("named", cause("torque_gain", probability=0.9)), truth("known", MASS))]
+    got = measured(cases)
+    assert got["probability, expected calibration error"] == (10, pytest.approx(0.0))
+    assert got["probability, Brier skill over the base rate"][1] == pytest.approx(0.0)
+    assert "0.90 ... 0.95" in made.reliability_text(cases)
+    assert math.isnan(measured([judged(document("no_effect"), truth("null"))])["probability, worst bin"][1])
+
+
+def verdict_in(folder, verdict):
+    folder.mkdir(parents=True)
+    (folder / "verdict.json").write_text(json.dumps(verdict))
+
+
+def test_command_scores_a_run_and_leaves_out_what_has_no_verdict(tmp_path, capsys):
+    cases, run = tmp_path / "cases", tmp_path / "run"
+    seal(cases / "base", truth("null", is_baseline=True))
+    seal(cases / "c1", truth("known", MASS, clean="base"))
+    seal(cases / "c2", truth("null", clean="base"))
+    verdict_in(run / "cases" / "base", document("no_effect"))
+    verdict_in(run / "cases" / "c1", document("named", cause("payload_mass")))
+    command.main([str(run), str(cases), "--only-score", "--json", str(tmp_path / "out.json")])
+    assert "1 cases of 2, 1 measured drives as they are" in capsys.readouterr().out
+    (row,) = (c for c in json.loads((tmp_path / "out.json").read_text())["cases"] if c["kind"] == "known")
+    assert row["first_is_right"]
+    assert (run / "cases" / "ledger.jsonl").is_file()
+
+
+def test_crash_is_recorded_and_the_others_go_on(tmp_path, capsys):
+    cases, run = tmp_path / "cases", tmp_path / "run"
+    for name in ("a", "b"):
+        seal(cases / name, truth("null"))
+    every = places(run, [cases])
+    verdict_in(every[1].out, document("no_effect"))
+    finished = (every[1].out / "verdict.json").stat().st_mtime_ns
+    diagnose_all(every, jobs=2, timeout_s=60.0)
+    said = json.loads((every[0].out / "verdict.json").read_text())
+    assert said["verdict"] == "failed"
+    assert "no drive" in said["error"]
+    assert json.loads((every[0].out / "cost.json").read_text())["cpu_seconds"] > 0.0
+    assert (every[1].out / "verdict.json").stat().st_mtime_ns == finished  # not made again
+    command.main([str(run), str(cases), "--only-score"])
+    assert "cases that failed" in capsys.readouterr().out
+
+
+def test_folders_without_cases_and_of_one_name_are_refused(tmp_path):
+    (tmp_path / "x").mkdir()
+    with pytest.raises(SystemExit, match="no case"):
+        places(tmp_path / "run", [tmp_path / "x"])
+    with pytest.raises(SystemExit, match="one name"):
+        places(tmp_path / "run", [tmp_path / "x", tmp_path / "y" / "x"])
+    assert Place(tmp_path / "x", tmp_path / "run").is_done is False
