@@ -23,6 +23,7 @@ from tests.blind import plain
 from tests.blind.injected.drives import real_folder
 from tests.blind.injected.make import kinds_of
 from tests.blind.injected.noise import SOURCES, added, noise_source
+from tests.blind.judging.answers import twins_of
 from tests.blind.metrics.plan import KNOWN
 from tests.blind.sealed import KINDS, seal
 from tests.blind.traces import detectability, residuals
@@ -144,7 +145,7 @@ def plain_case(index: int, seed: int, kind: str, duration_s: float, rng: np.rand
     if kind == "unknown":
         raise SystemExit("error: --world plain has no unknown forms: take another kind, or --world magic")
     first = PLAIN[index % len(PLAIN)]
-    others = [p for p in PLAIN if p[0] != first[0]]
+    others = [p for p in PLAIN if p[0] != first[0] and p[0] not in twins_of(first[0])]
     chosen = {"null": [], "known": [first]}.get(kind, [first, others[int(rng.integers(len(others)))]])
     own = 100_000 + seed * 1000 + index
 

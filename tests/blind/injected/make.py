@@ -9,7 +9,6 @@ another moment on.
 from __future__ import annotations
 
 import argparse
-import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -50,9 +49,10 @@ def bases(car: str, seed: int, count: int, duration_s: float, folder: Path) -> l
 
 
 def write_case(folder: Path, drive: Drive, truth: dict[str, Any]) -> None:
-    """A case as the judge wants it."""
+    """A case as the judge wants it; `is_sure`: with a vehicle file without `[spread]`."""
     write_drive(drive.columns, folder / "drive.parquet")
-    shutil.copyfile(drive.vehicle_file, folder / "vehicle.toml")
+    car = drive.vehicle_file.read_text(encoding="utf-8")
+    (folder / "vehicle.toml").write_text(car.split("[spread]")[0] if truth.get("is_sure") else car, encoding="utf-8")
     common = {"world": f"injected {drive.car}", "drive_type": f"{drive.car} {drive.trip}", "noise": "measured"}
     seal(folder, {**common, "effects": [], "unknown": None, **truth})
 
@@ -90,10 +90,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     real = given.real_logs or real_folder()
     if real is None or not real.is_dir():
         raise SystemExit("error: no measured drives: name their folder with --real-logs or AQUALOG_REAL_LOGS")
+    own = {"seed": given.seed, "is_sure": given.no_spread}
     made = bases(given.car, given.seed, given.bases, given.duration, real)
     for name, drive, _ in made:
         if not (given.folder / name / "truth.bin").is_file():
-            write_case(given.folder / name, drive, {"kind": "null", "seed": given.seed, "is_baseline": True})
+            write_case(given.folder / name, drive, {**own, "kind": "null", "is_baseline": True})
     sizes = [Place(given.folder / name, given.folder / "limits" / "of" / name) for name, *_ in made]
     diagnose_all(sizes, jobs=given.jobs, timeout_s=3600.0)
     said = [_stated(p) for p in sizes]
@@ -104,8 +105,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         name, drive, later = made[k]
         plan = planned(drive, said[k], kind, given.seed + counts[kind], rng)
         counts[kind] += 1
-        own, truth = filled_case(drive, later, plan)
-        write_case(given.folder / f"case-{i + 1:04d}", own, {**truth, "seed": given.seed, "clean": name})
+        filled, truth = filled_case(drive, later, plan)
+        write_case(given.folder / f"case-{i + 1:04d}", filled, {**own, **truth, "clean": name})
     print(f"{len(kinds)} cases and {len(made)} measured drives as they are in {given.folder}")
     return 0
 
@@ -130,6 +131,10 @@ def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--kind", choices=["mixed", *KINDS], default="mixed")
     parser.add_argument("--bases", type=int, default=1, help="measured drives that the cases are made from")
     parser.add_argument("--duration", type=float, default=600.0, help="seconds of a drive")
+    parser.add_argument(
+        "--no-spread", action="store_true",
+        help="vehicle files without what one more drive of the car may differ by: smaller limits, so smaller effects",
+    )  # fmt: skip
     parser.add_argument("--jobs", type=int, default=2, help="processes for the limits")
     parser.add_argument("--real-logs", type=Path, help="folder of the measured drives")
     return parser.parse_args(arguments)

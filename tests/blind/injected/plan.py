@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from tests.blind.injected.drives import WHEELS, Drive
+from tests.blind.injected.drives import Drive
 from tests.blind.injected.physics import UNKNOWN, position, speed
 from tests.blind.judging.answers import Answer, twins_of
 from tests.blind.metrics.rows import key_of
@@ -129,7 +129,3 @@ def _form(name: str, drive: Drive, clean: Answer, step: float, rng: np.random.Ge
         gain = limits.get("accelerometer_gain@a_x", 0.05)
         return {"rate": float(rng.choice([-1.0, 1.0])) * step * gain / max(float(np.std(v)), 2.0)}
     return {"force": 2.0 * step * force, "wavelength": float(np.clip(position(drive)[-1] / 12.0, 60.0, 700.0))}
-
-
-def has_wheels(drive: Drive) -> bool:
-    return all(f"omega_{w}" in drive.columns for w in WHEELS)
