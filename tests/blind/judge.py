@@ -22,7 +22,7 @@ from tests.blind.judging.run import Place, diagnose_all, places
 from tests.blind.metrics.table import curve_text, measures_text
 from tests.blind.sealed import LEDGER, open_truth, reopened
 
-__all__ = ["main", "score"]
+__all__ = ["answer_in", "main", "score"]
 
 
 def score(done: Sequence[Place]) -> list[Judged]:
@@ -33,17 +33,18 @@ def score(done: Sequence[Place]) -> list[Judged]:
         shutil.copyfile(place.case / "truth.bin", sealed)
         truth = open_truth(place.out)
         clean = truth.get("clean")
-        own = None if clean is None else _answer(place.out.parent / clean)
+        own = None if clean is None else answer_in(place.out.parent / clean)
         if clean is not None and own is None:
             print(f"left out: {place.out.name}: no verdict yet on its clean drive {clean}", file=sys.stderr)
             continue
-        answer, cost = _answer(place.out), _read(place.out / "cost.json")
+        answer, cost = answer_in(place.out), _read(place.out / "cost.json")
         assert answer is not None
         out.append(judge(f"{place.out.parent.name}/{place.out.name}", answer, truth, clean=own, cost=cost))
     return out
 
 
-def _answer(folder: Path) -> Answer | None:
+def answer_in(folder: Path) -> Answer | None:
+    """Return the answer of a folder's verdict, None if there is none yet."""
     document = _read(folder / "verdict.json")
     return read_answer(document) if document else None
 

@@ -12,14 +12,14 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from tests.blind.injected.drives import TRIPS, Drive, measured, real_folder, window, write_drive
 from tests.blind.injected.physics import UNKNOWN, inject, speed
 from tests.blind.injected.plan import Planned, planned
-from tests.blind.judge import _answer
+from tests.blind.judge import answer_in
 from tests.blind.judging.answers import Answer
 from tests.blind.judging.run import Place, diagnose_all
 from tests.blind.sealed import KINDS, seal
@@ -27,11 +27,21 @@ from tests.blind.sealed import KINDS, seal
 __all__ = ["main", "write_case"]
 
 SHIFT_S = 40.0  # how much later a null begins than its base
+LEAST_HELD_S = 120.0
 SHARES = {"null": 0.15, "known": 0.5, "unknown": 0.2, "compound": 0.15}
 
 
-def bases(car: str, seed: int, count: int, duration_s: float, folder: Path) -> list[tuple[str, Drive, Drive]]:
-    """(name, part of a drive, the same from `SHIFT_S` later on): trips drawn by seed, parts in which the car drives."""
+class Base(NamedTuple):
+    """Part of a measured drive, the same from `SHIFT_S` later on, and another part of that drive if it is long enough."""
+
+    name: str
+    drive: Drive
+    later: Drive
+    other: Drive | None
+
+
+def bases(car: str, seed: int, count: int, duration_s: float, folder: Path) -> list[Base]:
+    """Trips drawn by seed, parts in which the car drives."""
     rng = np.random.default_rng([seed, 51])
     out = []
     trips = [TRIPS[car][i] for i in rng.permutation(len(TRIPS[car]))]
@@ -44,7 +54,13 @@ def bases(car: str, seed: int, count: int, duration_s: float, folder: Path) -> l
         good = starts[np.asarray(moving) >= np.quantile(moving, 0.7)]
         start = float(rng.choice(good))
         later = min(SHIFT_S, 0.1 * length)
-        out.append((f"base-{k + 1}", window(drive, start, length), window(drive, start + later, length)))
+        before, after = start - SHIFT_S, end - start - length - 2.0 * SHIFT_S
+        held = None
+        if max(before, after) > LEAST_HELD_S:
+            begin = start + length + 2.0 * SHIFT_S if after >= before else 0.0
+            held = window(drive, begin, min(max(before, after), length))
+        parts = window(drive, start, length), window(drive, start + later, length)
+        out.append(Base(f"base-{k + 1}", *parts, held))
     return out
 
 
@@ -92,27 +108,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise SystemExit("error: no measured drives: name their folder with --real-logs or AQUALOG_REAL_LOGS")
     own = {"seed": given.seed, "is_sure": given.no_spread}
     made = bases(given.car, given.seed, given.bases, given.duration, real)
-    for name, drive, _ in made:
-        if not (given.folder / name / "truth.bin").is_file():
-            write_case(given.folder / name, drive, {**own, "kind": "null", "is_baseline": True})
-    sizes = [Place(given.folder / name, given.folder / "limits" / "of" / name) for name, *_ in made]
+    for b in made:
+        if not (given.folder / b.name / "truth.bin").is_file():
+            write_case(given.folder / b.name, b.drive, {**own, "kind": "null", "is_baseline": True})
+    sizes = [Place(given.folder / b.name, given.folder / "limits" / "of" / b.name) for b in made]
     diagnose_all(sizes, jobs=given.jobs, timeout_s=3600.0)
     said = [_stated(p) for p in sizes]
     rng = np.random.default_rng([given.seed, 52])
     kinds, counts = kinds_of(given.kind, given.count, rng), dict.fromkeys(KINDS, 0)
     for i, kind in enumerate(kinds):
         k = i % len(made)
-        name, drive, later = made[k]
-        plan = planned(drive, said[k], kind, given.seed + counts[kind], rng)
+        base = made[k]
+        plan = planned(base.drive, said[k], kind, given.seed + counts[kind], rng)
         counts[kind] += 1
-        filled, truth = filled_case(drive, later, plan)
-        write_case(given.folder / f"case-{i + 1:04d}", filled, {**own, **truth, "clean": name})
+        filled, truth = filled_case(base.drive, base.later, plan)
+        case = given.folder / f"case-{i + 1:04d}"
+        write_case(case, filled, {**own, **truth, "clean": base.name})
+        if given.held and base.other is not None:
+            write_drive(filled_case(base.other, base.other, plan)[0].columns, case / "held.parquet")
     print(f"{len(kinds)} cases and {len(made)} measured drives as they are in {given.folder}")
     return 0
 
 
 def _stated(place: Place) -> Answer:
-    answer = _answer(place.out)
+    answer = answer_in(place.out)
     if answer is None or answer.error or not answer.limits:
         why = "no verdict" if answer is None else answer.error or f"{answer.verdict} without limits of detection"
         raise SystemExit(f"error: {place.case}: {why}: remove {place.out} and take another seed")
@@ -134,6 +153,10 @@ def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--no-spread", action="store_true",
         help="vehicle files without what one more drive of the car may differ by: smaller limits, so smaller effects",
+    )  # fmt: skip
+    parser.add_argument(
+        "--held", action="store_true",
+        help="another part of the drive with the same effect as held-out drive; hills and waves are then on another road",
     )  # fmt: skip
     parser.add_argument("--jobs", type=int, default=2, help="processes for the limits")
     parser.add_argument("--real-logs", type=Path, help="folder of the measured drives")

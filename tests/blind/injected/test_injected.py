@@ -244,7 +244,8 @@ def test_measured_drives(car):
     real = real_folder()
     if real is None:
         pytest.skip("no measured drives: AQUALOG_REAL_LOGS names their folder")
-    ((_, drive, later),) = bases(car, 1, 1, 200.0, real)
+    ((_, drive, later, other),) = bases(car, 1, 1, 200.0, real)
+    assert (other is None) == (car == "rav4")
     v, a, dt = drive.columns["v_x"], drive.columns["a_x"], drive.dt
     slow = np.convolve(np.nan_to_num(np.gradient(v, dt)), np.ones(9) / 9.0, "same")
     good = np.isfinite(a) & np.isfinite(v)

@@ -1,0 +1,74 @@
+"""Sealed cases of the simulated worlds: what stands in a folder, and how visible its effect is."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+from tests.blind import make
+from tests.blind.injected.noise import Noise, added
+from tests.blind.plain import CAR, drive
+from tests.blind.sealed import open_truth
+from tests.blind.traces import detectability, residuals
+from tests.blind.world.effects import UNKNOWN
+from tests.blind.world.sensors import MEASURED
+
+
+def test_an_offset_in_white_noise_has_the_length_that_theory_gives():
+    rng = np.random.default_rng(1)
+    n, sigma, size = 4000, 0.02, 0.004
+    noise = {"force": sigma * rng.standard_normal(n)}
+    flat = {"force": np.zeros(n)}
+    z = detectability({"force": np.full(n, size)}, flat, noise)
+    assert z == pytest.approx(size / sigma * np.sqrt(n), rel=0.15)
+    slow = {"force": np.convolve(noise["force"], np.ones(40) / np.sqrt(40.0), "same")}  # as large, but slow
+    assert detectability({"force": np.full(n, size)}, flat, slow) < 0.5 * z
+
+
+def test_residuals_of_a_plain_drive_are_its_noise_and_a_load_shows_in_the_force_alone():
+    calm, loaded = (residuals(drive(5, "mixed", "white", 60.0, payload_mass=m), CAR) for m in (0.0, 300.0))
+    assert np.nanstd(calm["force"]) < 0.2
+    parts = {n: detectability({n: loaded[n]}, {n: calm[n]}, {n: calm[n]}) for n in ("force", "kinematic", "slip_fl")}
+    assert parts["force"] > 5.0 * max(parts["kinematic"], parts["slip_fl"])
+
+
+def case_of(folder, case):
+    make.write(folder, case, "plain", 4)
+    (folder / "verdict.json").write_text("{}")
+    return open_truth(folder)
+
+
+def test_plain_cases(tmp_path):
+    rng = np.random.default_rng(7)
+    for index, kind in enumerate(("null", "known", "compound")):
+        truth = case_of(tmp_path / kind, make.plain_case(index, 4, kind, 20.0, rng))
+        assert (truth["kind"], len(truth["effects"])) == (kind, index)
+        assert all(e["detectability"] > 0.0 for e in truth["effects"])
+        frames = [pl.read_parquet(tmp_path / kind / f"{n}.parquet") for n in ("drive", "held")]
+        assert frames[0].columns == frames[1].columns
+        assert not frames[0]["v_x"].equals(frames[1]["v_x"])
+    with pytest.raises(SystemExit, match="no unknown forms"):
+        make.plain_case(0, 4, "unknown", 20.0, rng)
+
+
+def test_magic_case_of_a_form_says_how_it_acts():
+    spec = next(s for s in make.specs("unknown", 0) if s.hidden[0].effect == "speed_hump")
+    frame, held, vehicle, truth = make.magic(spec, "unknown", 20.0)
+    assert frame.height == held.height == 2000
+    assert (truth["unknown"]["mechanism"], truth["unknown"]["depends_on"]) == ("force", ["v_x"])
+    assert truth["effects"] == []
+    assert vehicle.mass > 0.0
+    assert set(UNKNOWN) == {*make.FORMS, "hills"}
+
+
+def test_world_with_measured_noise_has_that_noise_and_no_other(monkeypatch, tmp_path):
+    size = 0.3
+    piece = {"a_x": size * np.random.default_rng(8).standard_normal(900)}
+    monkeypatch.setattr(make, "noise_source", lambda *_: [Noise("rav4", 0.01, piece)])
+    spec = next(make.specs("null", 1))
+    frame, _, _, truth = make.realnoise(spec, "null", 20.0, tmp_path)
+    assert truth["noise"].startswith("measured ")
+    jumps = np.diff(frame["a_x"].to_numpy())
+    assert np.std(jumps) == pytest.approx(size * np.sqrt(2.0), rel=0.1)
+    assert np.std(np.diff(frame["v_x"].to_numpy(), 2)) < 1e-3
+    assert {"a_x", "v_x"} <= set(MEASURED)
+    assert added({"v_x": np.ones(3)}, [Noise("rav4", 0.01, piece)], 0.01, np.random.default_rng(1))["v_x"].all()
