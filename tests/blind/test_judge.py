@@ -130,6 +130,18 @@ def test_what_the_clean_drive_says_is_not_counted():
     moved = judged(document("named", cause("signal_delay", 0.12, "torque", parameter="delay")), more, clean)
     assert moved.first_is_right
     assert moved.row.truth[0].values["delay"] == pytest.approx(0.13)
+    got = measured([moved])
+    assert got["true value within the 95 % interval"][0] == 0
+    assert got["the same in measured drives"] == (1, 1.0)
+    # a lag of one signal is, turned, that of the other
+    other = judged(document("named", cause("signal_delay", -0.5, "a_x", parameter="delay")), truth("null"), clean)
+    assert other.row.verdict == "no_effect"
+    far = judged(document("named", cause("signal_delay", 9.0, "a_x", parameter="delay")), truth("null"), clean)
+    assert far.row.verdict == "named"
+    # the word of the verdict went to the car's own fault, the form beside it is new
+    hidden = truth("unknown", unknown={"mechanism": "force", "depends_on": ["v_x"], "kind": "hump", "held_back": False})
+    beside = judged(document("named", late, unexplained=[form("force", "v_x")]), hidden, clean)
+    assert (beside.row.verdict, beside.form_is_right) == ("unexplained", True)
     shape = document("unexplained", unexplained=[form("force", "v_x")])
     assert judged(shape, truth("null"), shape).row.verdict == "no_effect"
 

@@ -14,12 +14,14 @@ from tests.blind.metrics.rows import Fact, Row, Said
 
 __all__ = ["Judged", "beyond", "facts_of", "judge"]
 
+LAGS = ("signal_delay", "clock_skew")
+
 
 @dataclass(frozen=True, slots=True)
 class Judged:
     """`row` for the figures that blind drives share; `chances`: (probability, whether it was so) of each cause and form.
 
-    `is_baseline`: a measured drive with nothing added, with no truth but itself.
+    `is_baseline`: a measured drive with nothing added, with no truth but itself; `is_measured`: one with effects added.
     """
 
     row: Row
@@ -30,6 +32,7 @@ class Judged:
     chances: tuple[tuple[float, bool], ...] = ()
     gain_low: float = math.nan
     is_baseline: bool = False
+    is_measured: bool = False
 
     @property
     def in_answer(self) -> bool:
@@ -95,12 +98,14 @@ def beyond(answer: Answer, clean: Answer, facts: tuple[Fact, ...]) -> tuple[Answ
     kept = []
     for cause, chance in zip(answer.causes, answer.probability, strict=True):
         before, fact = own.get(cause.key), sized.get(cause.key)
+        if fact is None and any(_is_same_lag(cause, old) for old in clean.causes):
+            continue
         if before is None or (fact is not None and _moved(cause, before, fact)):
             kept.append((cause, chance))
     forms = tuple(f for f in answer.forms if not any(_alike(f, old) for old in clean.forms))
     verdict = answer.verdict
     if verdict in ("named", "compound", "cannot_tell") and not kept:
-        verdict = "no_effect"
+        verdict = "unexplained" if forms else "no_effect"  # a verdict has one word: the car's own faults took it
     elif verdict in ("named", "compound"):
         verdict = "named" if len(kept) == 1 else "compound"
     elif verdict == "unexplained" and not forms:
@@ -109,6 +114,14 @@ def beyond(answer: Answer, clean: Answer, facts: tuple[Fact, ...]) -> tuple[Answ
         answer, verdict=verdict, causes=tuple(c for c, _ in kept), probability=tuple(p for _, p in kept), forms=forms
     )
     return new, tuple(sized[f.key] for f in facts)
+
+
+def _is_same_lag(cause: Said, old: Said) -> bool:
+    """A lag between two signals is that of the one or, turned, of the other: places and signs are exchangeable."""
+    if cause.effect != old.effect or cause.effect not in LAGS:
+        return False
+    (_, low, high), (_, a, b) = (next(iter(c.values.values()), (math.nan,) * 3) for c in (cause, old))
+    return (low <= b and a <= high) or (low <= -a and -b <= high)
 
 
 def _alike(a: Form, b: Form) -> bool:
@@ -164,5 +177,5 @@ def judge(
             chances.append((f.probability, unknown is not None and _fits(f, unknown, exact=True)))
     return Judged(
         row, truth["world"], truth["kind"], answer.forms, unknown, tuple(chances), answer.gain_low,
-        is_baseline=bool(truth.get("is_baseline")),
+        is_baseline=bool(truth.get("is_baseline")), is_measured=clean is not None,
     )  # fmt: skip
