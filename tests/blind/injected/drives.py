@@ -162,10 +162,16 @@ def _rav4(folder: Path, _: str) -> Columns:
 
 
 def _onto(x: FloatArray, at: FloatArray, t: FloatArray, like: FloatArray) -> FloatArray:
-    """`x` at times `at` moved onto the clock of `like` at `t`, by the shift at which the two follow each other best."""
-    shifts = np.arange(-3.0, 3.0, 0.02)
-    inner = (t > 4.0) & (t < t[-1] - 4.0)
-    fit = [np.corrcoef(np.gradient(np.interp(t + s, at, x))[inner], np.gradient(like)[inner])[0, 1] for s in shifts]
-    best = float(shifts[int(np.nanargmax(fit))])
+    """`x` at times `at` moved onto the clock of `like` at `t`: of all shifts that at which the accelerations over a second agree best."""
+    dt = float(np.median(np.diff(t)))
+    window = np.hanning(round(1.0 / dt) + 2)[1:-1]
+
+    def slope(y: FloatArray) -> FloatArray:
+        return np.gradient(np.convolve(y, window / window.sum(), "same"))
+
+    shifts = np.arange(-3.0, 3.0, 0.01)
+    inner = (t > 5.0) & (t < t[-1] - 5.0)
+    own = slope(like)[inner]
+    best = float(max(shifts, key=lambda s: np.corrcoef(slope(np.interp(t + s, at, x))[inner], own)[0, 1]))
     moved: FloatArray = np.interp(t + best, at, x, left=np.nan, right=np.nan)
     return moved
