@@ -75,8 +75,10 @@ def planned(drive: Drive, clean: Answer, kind: str, index: int, rng: np.random.G
     if kind == "null":
         return Planned(kind)
     if kind == "unknown":
-        name = list(UNKNOWN)[index % len(UNKNOWN)]
-        return Planned(kind, form=(name, _form(name, drive, clean, STEPS[2 + index // len(UNKNOWN) % 3], rng)))
+        # a force shows in a torque: without one a form of it would be hidden from everybody
+        names = [n for n, how in UNKNOWN.items() if how.mechanism != "force" or _has(drive, _PULL)]
+        name = names[index % len(names)]
+        return Planned(kind, form=(name, _form(name, drive, clean, STEPS[2 + index // len(names) % 3], rng)))
     asks = [a for a in ASKS if _has(drive, a.needs) and math.isfinite(_limit(a, clean))]
     asks = [a for a in asks if _limit(a, clean) <= a.most]
     if not asks:

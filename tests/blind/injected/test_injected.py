@@ -178,6 +178,13 @@ def test_sizes_are_one_to_four_times_the_stated_limit(drive):
     assert {"payload_mass", "torque_gain", "tyre_radius@rr"} <= seen
 
 
+def test_a_drive_without_torque_gets_no_force_form(drive):
+    bare = {n: x for n, x in drive.columns.items() if not n.startswith("torque")}
+    own, rng = Drive("test", "made", bare, CAR, HERE / "rav4.toml"), np.random.default_rng(1)
+    forms = {planned(own, limits_of(own), "unknown", i, rng).form[0] for i in range(8)}
+    assert forms == {"accelerometer_speed"}
+
+
 def test_truth_of_each_kind(drive, tmp_path):
     rng = np.random.default_rng(2)
     for i, kind in enumerate(("null", "known", "unknown", "compound")):
