@@ -71,7 +71,7 @@ class Drive:
 def real_folder() -> Path | None:
     """Folder of the measured drives: `AQUALOG_REAL_LOGS`, else beside the checkout; None if there is none."""
     beside = HERE.parents[2].parent / "shared" / "real_logs"
-    folder = Path(os.environ.get("AQUALOG_REAL_LOGS", beside))
+    folder = Path(os.environ.get("AQUALOG_REAL_LOGS") or beside)
     return folder if folder.is_dir() else None
 
 
