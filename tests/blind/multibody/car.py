@@ -32,9 +32,10 @@ SPREAD: Mapping[str, float] = {"mass": 0.004, "drag_area": 0.015, "rolling_resis
 """Standard deviation from day to day, relative: fuel, wind, temperature, friction of the driveline."""
 FILE_ERRORS: Mapping[str, float] = {
     "mass": 0.002, "drag_area": 0.008, "rolling_resistance": 0.008, "r_e": 3e-4, "r_l": 5e-4, "inertia": 0.04,
-    "slip_slope": 0.02, "h_cg": 0.03, "track": 0.005, "l_f": 0.003, "mu_max": 0.05,
+    "slip_slope": 0.02, "torque_gain": 0.002, "h_cg": 0.03, "track": 0.005, "l_f": 0.003, "mu_max": 0.05,
 }  # fmt: skip
 """What a calibration leaves, standard deviations, relative: of the vehicle file against the car on a mean day."""
+PRESSED = 0.972  # loaded radius over the rolling one
 WHEEL_SPREAD = 1.5e-4  # radius of a wheel against its axle's, relative
 
 
@@ -62,7 +63,6 @@ class Car(NamedTuple):
     lift_f: float  # [m^2] lift area on an axle
     lift_r: float
     wind: float
-    r_0: np.ndarray
     r_e: np.ndarray
     rim: np.ndarray  # [kg m^2]
     belt: np.ndarray
@@ -178,7 +178,7 @@ def draw_car(rng: np.random.Generator) -> tuple[Car, str]:
         bar=np.array([0.55, 0.3]) * spring[[0, 2]], anti=0.18,
         tyre_spring=tyre, tyre_damper=np.full(4, 140.0), static=static,
         drag_area=about(a.drag_area, 0.04), air_density=1.204, lift_f=0.05, lift_r=0.09, wind=0.0,
-        r_0=0.972 * r_e + static / tyre, r_e=r_e * (1.0 + WHEEL_SPREAD * rng.standard_normal(4)),
+        r_e=r_e * (1.0 + WHEEL_SPREAD * rng.standard_normal(4)),
         rim=rim, belt=0.45 * inertia * ones, torsion=8.5e4 * ones, torsion_damper=60.0 * ones,
         slope=slope, cornering=np.array([15.0, 15.0, 19.0, 19.0]) * about(1.0, 0.06),
         load_law=np.full(4, rng.normal(0.18, 0.07)), load_ref=static.copy(), mu=np.full(4, about(1.04, 0.03)),
@@ -210,11 +210,27 @@ def of_the_day(car: Car, rng: np.random.Generator) -> Car:
     ))  # fmt: skip
 
 
+def gradients(car: Car) -> tuple[float, float]:
+    """Pitch and roll per acceleration at rest on the springs, nose up and right side down positive [rad/(m/s^2)]."""
+    base = car.l_f + car.l_r
+    series = 1.0 / (1.0 / car.spring + 1.0 / car.tyre_spring)
+    x = np.array([car.l_f, car.l_f, -car.l_r, -car.l_r])
+    K = np.array([[series.sum(), -(series * x).sum()], [-(series * x).sum(), (series * x * x).sum()]])
+    moment = (1.0 - car.anti) * car.h_cg * car.mass
+    direct = car.anti * car.h_cg * car.mass / base**2 * (2.0 / car.tyre_spring.mean())
+    pitch = float(np.linalg.solve(K, [0.0, moment])[1] + 0.5 * direct)
+    half = 0.5 * car.track
+    stiff = car.spring + 2.0 * np.repeat(car.bar, 2)
+    roll_stiff = (half * half / (1.0 / stiff + 1.0 / car.tyre_spring)).sum()
+    tyres = half * half * car.tyre_spring.sum()
+    return pitch, float(((1.0 - car.anti) / roll_stiff + car.anti / tyres) * car.h_cg * car.mass)
+
+
 def vehicle_file(car: Car, drivetrain: str, rng: np.random.Generator) -> Vehicle:
     """What a calibration of the car on a mean day would write, with the errors that it leaves."""
     roll, area = _constant_and_square(car)
-    r_l = (car.r_0 - car.static / car.tyre_spring)[[0, 2]]
-    inertia = (car.rim + car.belt)[[0, 2]]
+    # a file has the radius as measured under load as the lever of forces, so a calibration finds a gain of its share
+    inertia = PRESSED * (car.rim + car.belt)[[0, 2]]
 
     def off(name: str, x: float) -> float:
         return round(float(x * (1.0 + FILE_ERRORS[name] * rng.standard_normal())), 6)
@@ -225,8 +241,8 @@ def vehicle_file(car: Car, drivetrain: str, rng: np.random.Generator) -> Vehicle
     return Vehicle(
         name="car", drivetrain=drivetrain, mass=mass, l_f=l_f, l_r=round(base - l_f, 6),  # type: ignore[arg-type]
         h_cg=off("h_cg", car.h_cg), track=off("track", car.track), drag_area=drag, air_density=car.air_density,
-        rolling_resistance=rolling, torque_split_rear=car.split_rear, torque_gain=1.0, r_e_f=r_e[0], r_e_r=r_e[1],
-        r_l_f=off("r_l", r_l[0]), r_l_r=off("r_l", r_l[1]), inertia_f=off("inertia", inertia[0]),
+        rolling_resistance=rolling, torque_split_rear=car.split_rear, torque_gain=off("torque_gain", PRESSED * car.torque_gain), r_e_f=r_e[0], r_e_r=r_e[1],
+        r_l_f=off("r_l", PRESSED * car.r_e[0]), r_l_r=off("r_l", PRESSED * car.r_e[2]), inertia_f=off("inertia", inertia[0]),
         inertia_r=off("inertia", inertia[1]), slip_slope_f=off("slip_slope", _secant(car, 0)),
         slip_slope_r=off("slip_slope", _secant(car, 2)), mu_max=off("mu_max", car.mu[0]),
         spread={
@@ -239,7 +255,11 @@ def vehicle_file(car: Car, drivetrain: str, rng: np.random.Generator) -> Vehicle
 
 
 def _constant_and_square(car: Car) -> tuple[float, float]:
-    """Rolling resistance and drag area by which a balance without the other powers of speed fits the car's best."""
+    """Rolling resistance and drag area by which a balance without the other powers of speed fits the log's best.
+
+    The wind that holds the car at its height and lifts its axles also turns its nose, and the accelerometer with it: the
+    log shows a drag area less by that.
+    """
     v = np.linspace(3.0, 38.0, 200)
     lift = 0.5 * car.air_density * (car.lift_f + car.lift_r) * v**2
     weight = car.mass * G
@@ -247,7 +267,8 @@ def _constant_and_square(car: Car) -> tuple[float, float]:
     force = roll * (weight - lift) + 0.5 * car.air_density * car.drag_area * v**2
     form = np.stack([np.full(v.size, weight), 0.5 * car.air_density * v**2], axis=1)
     fit = np.linalg.lstsq(form, force, rcond=None)[0]
-    return float(fit[0]), float(fit[1])
+    nose = car.h_cg * car.drag_area + car.l_f * car.lift_f - car.l_r * car.lift_r
+    return float(fit[0]), float(fit[1] - G * gradients(car)[0] / car.h_cg * nose)
 
 
 def _secant(car: Car, i: int) -> float:

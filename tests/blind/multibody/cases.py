@@ -7,6 +7,7 @@ and without it; the difference of the residual channels over their noise, summed
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -130,14 +131,14 @@ def _shown(plan: Plan, vehicle: Vehicle, h: Hidden, z_least: float) -> tuple[Hid
 def detectability(plan: Plan, vehicle: Vehicle, h: Hidden) -> dict[str, float]:
     """`z` and `z_own` of one hidden cause in the first drive of a plan."""
     block = 2 if h.name in _FAST else BLOCK
-    with_it, without = (residuals(_clean(plan, vehicle, of), vehicle, block) for of in ((h,), ()))
-    noise = residuals(_seen(plan, vehicle, (), 0), vehicle, block)
-    ride = _ride(plan, vehicle, (), 0, smooth=True).rows
-    forms = _forms(ride, block)
+    clean = [_clean(plan, vehicle, of) for of in ((h,), ())]
+    with_it, without, noise = (
+        residuals(m, vehicle, block, plan.duration_s) for m in (*clean, _seen(plan, vehicle, (), 0))
+    )
+    forms = _forms(_on_a_grid(clean[1], plan.duration_s), block)
     best, own = 0.0, 0.0
     for name, x in with_it.items():
         d = x - without[name]
-        # a driver is elsewhere after a while: only what lasts longer than a meeting of two drives counts
         rest = d - forms @ np.linalg.lstsq(forms, d, rcond=None)[0]
         best, own = max(best, _energy(d, noise[name])), max(own, _energy(rest, noise[name]))
     return {"z": float(np.sqrt(best)), "z_own": float(np.sqrt(own))}
@@ -158,9 +159,9 @@ def _energy(d: np.ndarray, noise: np.ndarray) -> float:
     return float(np.sum(weight * np.abs(np.fft.rfft(d)) ** 2 / np.maximum(smooth, 1e-30)) / 2.0)
 
 
-def _forms(rows: np.ndarray, block: int) -> np.ndarray:
-    v = _blocks(rows[:, ROWS["v_x"]], block)
-    force = _blocks(sum(rows[:, ROWS[f"torque_{w}"]] for w in WHEELS), block)
+def _forms(x: Mapping[str, np.ndarray], block: int) -> np.ndarray:
+    v = _blocks(x["v_x"], block)
+    force = _blocks(sum(x[f"torque_{w}"] for w in WHEELS), block)
     t = np.linspace(0.0, 1.0, v.size)
     return np.stack([np.ones(v.size), t, v, v * v, force], axis=1) / np.array([1.0, 1.0, 30.0, 900.0, 1000.0])
 
@@ -170,15 +171,14 @@ def _blocks(x: np.ndarray, block: int) -> np.ndarray:
     return x[: m * block].reshape(m, block).mean(axis=1)
 
 
-def residuals(messages: list[Message], vehicle: Vehicle, block: int) -> dict[str, np.ndarray]:
-    """Channels of a log against the vehicle file, as means over blocks of so many samples of 10 ms."""
-    at = {s: (m.t, x) for m in messages for s, x in m.columns.items()}
-    t = np.arange(0.1, at["a_x"][0][-1] - 0.1, DT)
-    x = {s: np.interp(t, *both) for s, both in at.items()}
-    v = x["v_x"]
+def residuals(messages: list[Message], vehicle: Vehicle, block: int, seconds: float) -> dict[str, np.ndarray]:
+    """Channels of a log of so many seconds against the vehicle file, as means over blocks of samples of 10 ms."""
+    x = _on_a_grid(messages, seconds)
+    v, gain = x["v_x"], vehicle.torque_gain
     rim = {w: x[f"omega_{w}"] * vehicle.r_e(w) for w in WHEELS}
     pull = sum(
-        (x[f"torque_{w}"] - vehicle.inertia(w) * np.gradient(x[f"omega_{w}"], DT)) / vehicle.r_l(w) for w in WHEELS
+        (gain * x[f"torque_{w}"] - vehicle.inertia(w) * np.gradient(x[f"omega_{w}"], DT)) / vehicle.r_l(w)
+        for w in WHEELS
     )
     drag = 0.5 * vehicle.air_density * vehicle.drag_area * v**2
     scrub = x["a_y"] * vehicle.l_r / vehicle.wheelbase * np.sin(x["steer_angle"])
@@ -191,10 +191,15 @@ def residuals(messages: list[Message], vehicle: Vehicle, block: int) -> dict[str
         slope = vehicle.slip_slope_f if w[0] == "f" else vehicle.slip_slope_r
         along = v - x["yaw_rate"] * side
         turn = vehicle.inertia(w) * np.gradient(x[f"omega_{w}"], DT)
-        out[f"slip_{w}"] = rim[w] - along * (1.0 + (x[f"torque_{w}"] - turn) / (vehicle.r_l(w) * slope * load))
+        out[f"slip_{w}"] = rim[w] - along * (1.0 + (gain * x[f"torque_{w}"] - turn) / (vehicle.r_l(w) * slope * load))
     out["lateral"] = x["a_y"] - v * x["yaw_rate"]
     moving = v > 2.0
     return {n: _blocks(np.where(moving, r, 0.0), block) for n, r in out.items()}
+
+
+def _on_a_grid(messages: list[Message], seconds: float) -> dict[str, np.ndarray]:
+    t = 0.2 + DT * np.arange(round((seconds - 0.5) / DT))
+    return {s: np.interp(t, m.t, x) for m in messages for s, x in m.columns.items()}
 
 
 def _clean(plan: Plan, vehicle: Vehicle, hidden: tuple[Hidden, ...]) -> list[Message]:
@@ -247,7 +252,7 @@ def _ride(plan: Plan, vehicle: Vehicle, hidden: tuple[Hidden, ...], index: int, 
     if smooth:
         fine = np.zeros_like(fine)
     knows = np.array(
-        [vehicle.mass, 0.5 * vehicle.air_density * vehicle.drag_area, vehicle.rolling_resistance, vehicle.r_l_f]
+        [vehicle.mass, 0.5 * vehicle.air_density * vehicle.drag_area, vehicle.rolling_resistance, vehicle.r_e_f]
     )
     rows = drive_along(target, coast, lateral, unrest, wander, wind, fine, slow, setup.car, setup.odd, style, knows)
     if not np.isfinite(rows).all():

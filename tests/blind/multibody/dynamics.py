@@ -142,8 +142,8 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
             u, w = c * u + s * w, c * w - s * u
         F_z = aux[LOAD + i]
         pressed = F_z / p.tyre_spring[i]
-        r = (p.r_0[i] - pressed) * (1.0 - p.leak_radius[i] * leak)
-        # the tread length stays, so that a deflection takes little from the rolling radius
+        # the tread length stays, so that a deflection takes little from the rolling radius; by it the force acts on the
+        # belt, as the work of slip, rolling and water is all that may be lost between torque and road
         r_e = p.r_e[i] * (1.0 + p.growth[i] * u * u) * (1.0 - p.leak_radius[i] * leak)
         r_e -= 0.04 * (pressed - p.load_ref[i] / p.tyre_spring[i])
         film = at(slow, FILM_L if i % 2 == 0 else FILM_R, way + (base if front else 0.0), COARSE)
@@ -168,13 +168,13 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
         slipping = y[RIM + i] - y[BELT + i]
         T = p.torsion[i] * twist + p.torsion_damper[i] * slipping
         rolling = (p.roll_0[i] * warm + p.roll_1 * pace + p.roll_4 * pace**4) * F_z
-        against = (rolling + 0.6 * push) * r * tanh(y[BELT + i] / 0.7)
+        against = (rolling + 0.6 * push) * r_e * tanh(y[BELT + i] / 0.7)
         drag = p.brake_drag[i] + (odd.linger[0] * linger if i > 1 else 0.0)
         ripple = 0.0
         if odd.ripple[0] != 0.0 and i == int(odd.ripple[1]):
             ripple = odd.ripple[0] * sin(odd.ripple[2] * y[ANGLE + i])
         f[RIM + i] = (aux[T_SHAFT + i] - T - drag * tanh(y[RIM + i]) + ripple) / p.rim[i]
-        f[BELT + i] = (T - F_x * r - against) / p.belt[i]
+        f[BELT + i] = (T - F_x * r_e - against) / p.belt[i]
         f[TORSION + i] = slipping
         f[ANGLE + i] = y[RIM + i]
         b_x, b_y = (c * F_x - s * F_y, s * F_x + c * F_y) if front else (F_x, F_y)

@@ -166,8 +166,7 @@ def _inertia(s: Setup, v: Values, where: str | None) -> Setup:
 
 def _radius(s: Setup, v: Values, where: str | None) -> Setup:
     by = 1.0 + v["delta"]
-    r_0 = _times(s.car.r_0 - s.car.static / s.car.tyre_spring, where, by) + s.car.static / s.car.tyre_spring
-    return replace(s, car=s.car._replace(r_e=_times(s.car.r_e, where, by), r_0=r_0))
+    return replace(s, car=s.car._replace(r_e=_times(s.car.r_e, where, by)))
 
 
 def _uneven(s: Setup, v: Values, where: str | None) -> Setup:

@@ -11,7 +11,7 @@ from scipy.signal import lfilter
 
 from aqualog.core.compiled import compiled
 
-from .car import Car
+from .car import Car, gradients
 from .driver import ROWS
 
 __all__ = ["NOISES", "WHEELS", "Error", "Message", "coloured", "edges", "gusts", "ideal", "measure"]
@@ -146,7 +146,7 @@ def _truth(rows, car, errors, phases, noise, rng):
     """Signals (n,) before the bus, in the middle of each sample."""
     x = {s: rows[:, ROWS[s]] for s in ("yaw_rate", "steer_angle")}
     x["v_x"] = rows[:, ROWS["v_x"]] + 1.0 * rows[:, ROWS["pitch_rate"]]  # an antenna on the roof
-    pitch, roll = _gradients(car)
+    pitch, roll = gradients(car)
     leak = LEAK_SD * rng.standard_normal(2) if noise else np.zeros(2)
     bias = BIAS_SD * rng.standard_normal(2) if noise else np.zeros(2)
     for i, (symbol, tilt) in enumerate((("a_x", pitch), ("a_y", roll))):
@@ -176,22 +176,6 @@ def _truth(rows, car, errors, phases, noise, rng):
 def _earlier(x: np.ndarray, by: float) -> np.ndarray:
     n = np.arange(x.size, dtype=np.float64)
     return np.interp(n + by / DT, n, x)
-
-
-def _gradients(car: Car) -> tuple[float, float]:
-    """Pitch and roll per acceleration at rest on the springs, nose up and right side down positive [rad/(m/s^2)]."""
-    base = car.l_f + car.l_r
-    series = 1.0 / (1.0 / car.spring + 1.0 / car.tyre_spring)
-    x = np.array([car.l_f, car.l_f, -car.l_r, -car.l_r])
-    K = np.array([[series.sum(), -(series * x).sum()], [-(series * x).sum(), (series * x * x).sum()]])
-    moment = (1.0 - car.anti) * car.h_cg * car.mass
-    direct = car.anti * car.h_cg * car.mass / base**2 * (2.0 / car.tyre_spring.mean())
-    pitch = float(np.linalg.solve(K, [0.0, moment])[1] + 0.5 * direct)
-    half = 0.5 * car.track
-    stiff = car.spring + 2.0 * np.repeat(car.bar, 2)
-    roll_stiff = (half * half / (1.0 / stiff + 1.0 / car.tyre_spring)).sum()
-    tyres = half * half * car.tyre_spring.sum()
-    return pitch, float(((1.0 - car.anti) / roll_stiff + car.anti / tyres) * car.h_cg * car.mass)
 
 
 @compiled
