@@ -15,7 +15,7 @@ from tests.blind.multibody.car import NO_ODD, draw_car, gradients, vehicle_file
 from tests.blind.multibody.cases import DT, draw_plan, make_case, residuals
 from tests.blind.multibody.driver import ROWS, drive_along
 from tests.blind.multibody.dynamics import odd_force
-from tests.blind.multibody.hidden import HELD_BACK, KINDS, Setup, applied, draw, enlarged, names_of
+from tests.blind.multibody.hidden import HELD_BACK, KINDS, Setup, applied, draw, enlarged, in_worths, names_of
 from tests.blind.multibody.roads import Place, build_road
 from tests.blind.multibody.seal import LEDGER, SealError, open_truth, seal_truth
 from tests.blind.multibody.sensors import NOISES, TEETH, WHEELS, Error, coloured, edges, ideal, measure
@@ -194,6 +194,9 @@ def test_kinds_are_the_contracts_and_thirteen_forms_besides():
             assert set(h.values) <= set(given)
             assert h.where is None or h.where in EFFECTS[name].places
             assert all(given[p].low <= x <= given[p].high for p, x in h.values.items()), h
+            assert all(
+                given[p].low <= x <= given[p].high for p, x in enlarged(h, cases.LARGEST / in_worths(h)).values.items()
+            )
     assert enlarged(draw("slip_stiffness", np.random.default_rng(2)), 50.0).values["gain"] >= 0.2
 
 

@@ -17,7 +17,7 @@ from aqualog.core.vehicle import Vehicle
 
 from .car import NO_ODD, Car, draw_car, of_the_day, vehicle_file
 from .driver import ROWS, draw_style, drive_along
-from .hidden import DRY, KINDS, TWINS, Hidden, Setup, applied, draw, enlarged, names_of
+from .hidden import DRY, KINDS, TWINS, Hidden, Setup, applied, draw, enlarged, in_worths, names_of
 from .roads import Place, bends, build_road, speeds
 from .sensors import NOISES, WHEELS, Message, coloured, gusts, ideal, measure
 
@@ -27,6 +27,7 @@ DT = 0.01
 G = 9.81
 KIND_NAMES = ("null", "known", "unknown", "compound", "mixed")
 Z_LEAST = 8.0
+LARGEST = 6.0  # sizes worth naming: a cause that is not shown then stays weak, and its z says so
 BLOCK = 20  # samples of 10 ms in a block of the residuals whose difference counts
 _FAST = ("tone_ring", "turn_ripple")  # faster than blocks
 
@@ -113,17 +114,14 @@ def make_case(plan: Plan, *, z_least: float = Z_LEAST) -> Case:
 
 
 def _shown(plan: Plan, vehicle: Vehicle, h: Hidden, z_least: float) -> tuple[Hidden, dict[str, float]]:
-    """The cause at a size that the drive shows, with its detectability; at most three times as large as drawn."""
+    """The cause at a size that the drive shows, with its detectability; at most six sizes worth naming."""
     own = not KINDS[h.name].known
     z = detectability(plan, vehicle, h)
-    grown = 1.0
     for _ in range(2):
         least = z["z_own"] if own else z["z"]
-        if least >= z_least or grown >= 3.0:
+        if least >= z_least or in_worths(h) >= 0.99 * LARGEST:
             break
-        more = min(1.1 * z_least / max(least, 1e-6), 3.0 / grown)
-        grown *= more
-        h = enlarged(h, more)
+        h = enlarged(h, min(1.1 * z_least / max(least, 1e-6), LARGEST / in_worths(h)))
         z = detectability(plan, vehicle, h)
     return h, {k: round(x, 2) for k, x in z.items()}
 

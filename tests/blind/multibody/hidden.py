@@ -15,7 +15,19 @@ from .car import Car, Odd, settle
 from .roads import Place
 from .sensors import WHEELS, Error
 
-__all__ = ["HELD_BACK", "KINDS", "TWINS", "Hidden", "Kind", "Setup", "applied", "draw", "enlarged", "names_of"]
+__all__ = [
+    "HELD_BACK",
+    "KINDS",
+    "TWINS",
+    "Hidden",
+    "Kind",
+    "Setup",
+    "applied",
+    "draw",
+    "enlarged",
+    "in_worths",
+    "names_of",
+]
 
 Values = Mapping[str, float]
 DRY = ("city", "country", "motorway", "staircase", "coast_down")
@@ -91,6 +103,13 @@ def enlarged(hidden: Hidden, by: float) -> Hidden:
     if kind.neutral == 1.0:
         values = {n: max(x, 0.2) if n in sized else x for n, x in values.items()}
     return replace(hidden, values=values)
+
+
+def in_worths(hidden: Hidden) -> float:
+    """The size, in sizes worth naming."""
+    kind = KINDS[hidden.name]
+    name, worth = next(iter(kind.worth[hidden.where].items()))
+    return abs(hidden.values[name] - kind.neutral) / worth
 
 
 def applied(setup: Setup, hidden: tuple[Hidden, ...]) -> Setup:
@@ -241,7 +260,7 @@ _KNOWN = {
                            neutral=1.0),
     "slip_stiffness": Kind(_by("gain", all_=0.12, f=0.12, r=0.12, each=0.17), _wheels("slope", "gain"), LIVELY, neutral=1.0),
     "slip_stiffness_drift": Kind(_by("rate", all_=5e-4), _car(slope_drift="rate"), LIVELY),
-    "load_sensitivity": Kind(_by("delta", all_=0.35), _car(load_law="delta"), LIVELY),
+    "load_sensitivity": Kind(_by("delta", all_=0.3), _car(load_law="delta"), LIVELY),
     "tyre_radius": Kind(_by("delta", all_=0.004, f=0.003, r=0.003, each=0.003), _radius),
     "tyre_radius_growth": Kind(_by("growth", all_=1.6e-6), _car(growth="growth"), ("country", "motorway", "staircase"), signs=1),
     "relaxation_length": Kind(_by("length", all_=0.3), _car(bristle_x="length", bristle_y="length"), LIVELY, signs=1),
