@@ -135,27 +135,6 @@ def drive_along(target, coast, lateral, unrest, wander, gust, fine, slow, p, odd
             x = (j + 0.5) / _SUB
             now_drive, now_brake = drive + x * (next_drive - drive), brake + x * (foot - brake)
             now_steer = steer + x * (hands - steer)
-            if k == 0 and j == 0:
-                # the scheme needs two derivatives: the first step counts its own twice
-                advance(
-                    0.0,
-                    0.0,
-                    y.copy(),
-                    f,
-                    before,
-                    aux,
-                    fine,
-                    slow,
-                    p,
-                    odd,
-                    now_drive,
-                    now_brake,
-                    gear,
-                    now_steer,
-                    gust[0],
-                    resting,
-                    braked,
-                )
             advance(
                 k * DT + j * H,
                 k / n,

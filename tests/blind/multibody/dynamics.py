@@ -214,6 +214,8 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
 def advance(t, share, y, f, before, aux, fine, slow, p, odd, drive, brake, gear, steer, gust, linger, braked):
     """One step; `before` are the derivatives of the last step, `braked` (4,) gets the brakes' torques [N m]."""
     _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, linger)
+    if t <= 0.0:  # the first step is Euler's
+        before[:] = f
     for k in range(STATES):
         y[k] += H * (1.5 * f[k] - 0.5 * before[k])
         before[k] = f[k]
