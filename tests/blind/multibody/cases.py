@@ -103,7 +103,7 @@ def make_case(plan: Plan, *, z_least: float = Z_LEAST) -> Case:
     truth: dict[str, object] = {
         "hidden": [
             {"effect": h.name, "where": h.where, "values": dict(h.values), "known": KINDS[h.name].known,
-             "held_back": KINDS[h.name].held_back, "channel": KINDS[h.name].channel,
+             "held_back": KINDS[h.name].held_back, "accepts": KINDS[h.name].accepts, "channel": KINDS[h.name].channel,
              "depends_on": KINDS[h.name].depends_on, **z}
             for h, z in zip(hidden, shown, strict=True)
         ],

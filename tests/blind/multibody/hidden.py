@@ -83,6 +83,7 @@ class Kind:
     on_the_road: bool = False  # the held-out drive takes the same road
     channel: str = ""
     depends_on: tuple[str, ...] = ()
+    accepts: tuple[str, ...] = ()  # names that are right as well, where the library has the form under a known name
 
 
 def draw(name: str, rng: np.random.Generator, scale: float = 1.0) -> Hidden:
@@ -305,7 +306,8 @@ _UNKNOWN = {
         shape=lambda rng: {"period": rng.uniform(120.0, 400.0), "phase": rng.uniform(0.0, 6.28)}),
     "rolling_road": _form(
         _by("rms", all_=0.006), lambda s, v, _: replace(s, place=s.place._replace(rolling=v["rms"], length=v["length"])),
-        "kinematic", ("position",), on_the_road=True, signs=1, shape=lambda rng: {"length": rng.uniform(500.0, 1200.0)}),
+        "kinematic", ("position",), accepts=("road_grade", "unexplained_grade"),
+        on_the_road=True, signs=1, shape=lambda rng: {"length": rng.uniform(500.0, 1200.0)}),
     "steering_drag": _form(
         _by("force", all_=2500.0), _odd("steering", "force"), "force_balance", ("steer_angle",), programmes=("city", "country"),
         signs=1),
