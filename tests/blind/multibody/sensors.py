@@ -45,7 +45,7 @@ SHARE = {"a": 1.0, "yaw": 0.3, "steer": 0.2, "omega": 0.2, "torque": 0.4, "v": 0
 STEP = {"a": 0.005, "yaw": 2e-4, "steer": 1e-4, "omega": 0.004, "torque": 0.5, "v": 0.003}
 COARSE = {"a": 0.03, "yaw": 1e-3, "steer": 4e-4, "omega": 0.028, "torque": 4.0, "v": 0.02}
 STAMP_SD = 1e-3  # [s] what is left of a message's latency when the logger has corrected it
-LEAK_SD, BIAS_SD = 3e-3, 8e-3  # accelerometer after its own correction: relative, [m/s^2]
+LEAK_SD, BIAS_SD = 1.5e-3, 8e-3  # accelerometer after its own correction: relative, [m/s^2]
 
 
 class Error(NamedTuple):
@@ -115,7 +115,7 @@ def _messages(rows, car, errors, noise, rng):
     middle = (np.arange(n) + 0.5) * DT
     phases = rng.uniform(0.0, 2.0 * np.pi, 4)
     truth = _truth(rows, car, errors, phases, noise, rng)
-    slow = 1.0 + (4e-3 * _relaxed(DT, 20.0, n, rng) if noise else 0.0)  # of all torques together
+    slow = 1.0 + (2e-3 * _relaxed(DT, 20.0, n, rng) if noise else 0.0)  # of all torques together
     out = []
     for name, (rates, signals) in BUS.items():
         rate = 100.0 if noise is None else float(rng.choice(rates))
