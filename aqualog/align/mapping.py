@@ -136,15 +136,18 @@ def values_read(vehicle: Vehicle) -> tuple[float, ...]:
     return (*(vehicle.r_e(w) for w in WHEELS), vehicle.steering_ratio, vehicle.torque_gain)
 
 
-_SHARED = ("torque_", "pressure_", "water_depth")
+_SHARED = ("pressure_", "water_depth")
 """Signals of which one measured value may stand for both wheels, or both sides."""
 
 
 def read_alike(one: Entry, other: Entry) -> bool:
     """Return whether two entries would give one channel twice: at the same scale, and not as one value for both wheels.
 
-    Such a line is a slip: wheels that never differ.
+    Such a line is a slip: wheels that never differ. Axles may share a torque by a scale, each a part of it.
     """
+    if one.symbol.startswith("torque_") and other.symbol.startswith("torque_"):
+        is_pair = len(one.symbol) == len(other.symbol) == len("torque_fl") and one.symbol[7] == other.symbol[7]
+        return not is_pair and (one.unit, one.scale) == (other.unit, other.scale) and one.scale == 1.0
     if any(one.symbol.startswith(s) and other.symbol.startswith(s) for s in _SHARED):
         return False
     return (one.unit, one.scale) == (other.unit, other.scale)

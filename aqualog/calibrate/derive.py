@@ -133,16 +133,17 @@ _KEYS = {
 
 
 def contradicted(parameters: Sequence[Parameter], vehicle: Vehicle) -> list[Parameter]:
-    """Return the estimates whose interval excludes what the vehicle file gives.
+    """Return the estimates whose interval excludes what the vehicle file knows: its guesses are no knowledge.
 
     The torque gain does not count: it belongs to the torques as they are read. What `--fix` gives is no estimate.
     """
     radii = {"wheels.r_e_f", "wheels.r_e_r"}
     needs = {**{n: {key} for n, key in _KEYS.items() if n != "torque_gain"}, "r_e_ratio": radii}
+    known = {key for key in vehicle.given & KEYS.keys() if provenance_of(vehicle, key).source != "guess"}
     return [
         p
         for p in parameters
-        if p.identified and needs.get(p.name, {""}) <= vehicle.given and p.ci95[0] < p.ci95[1]
+        if p.identified and needs.get(p.name, {""}) <= known and p.ci95[0] < p.ci95[1]
         and not p.ci95[0] <= p.file_value <= p.ci95[1]
     ]  # fmt: skip
 

@@ -216,7 +216,8 @@ class Store:
             frame = pl.read_parquet(self._place.copy(name), hive_partitioning=False)
         except (OSError, *_UNREADABLE):
             return None
-        return frame if {"t", "v_x"} <= set(frame.columns) else None
+        is_whole = {"t", "v_x"} <= set(frame.columns) and all(t.is_numeric() or t == pl.Boolean for t in frame.dtypes)
+        return frame if is_whole else None
 
     def contents(self) -> dict[str, Any]:
         """Hashes that batches and shards have kept."""

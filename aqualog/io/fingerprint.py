@@ -115,7 +115,7 @@ def sources_stamp(names: tuple[str, ...]) -> str:
 
 def hash_of(parts: Iterable[str]) -> str:
     """One key of many texts; 32 hexadecimal digits."""
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:_LENGTH]
+    return hashlib.sha256("\n".join(parts).encode(errors="surrogateescape")).hexdigest()[:_LENGTH]
 
 
 def _digest(path: Path, size: int) -> str:

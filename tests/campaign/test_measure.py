@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
 from aqualog.align.load import LoadedLong, load_drive, load_signals
@@ -158,6 +159,8 @@ def test_the_log_s_own_rate_is_kept_around_episodes_alone(tmp_path):
     text = run_page(data, info, data.samples(info), None, back="", full=full)
     assert "The log&#39;s own rate, one point every 0.01 s, from 2 s before to 2 s after the episodes" in text
     (path,) = (tmp_path / "store" / "full").iterdir()
+    pl.read_parquet(path).with_columns(pl.col("v_x").cast(pl.String)).write_parquet(path)
+    assert data.full(info) is None  # columns of another kind are damage
     path.unlink()
     older = load_results(configured, Store(tmp_path / "store"))
     assert older.full(info) is None

@@ -58,6 +58,16 @@ def test_one_torque_for_both_wheels_and_one_channel_in_two_scales_are_no_slip(tm
     assert len(load_signal_map(write(tmp_path, "[signals]\n" + "\n".join(lines))).entries) == 6
 
 
+@pytest.mark.parametrize(
+    ("one", "other"), [("torque_f", "torque_r"), ("torque_r", "torque_rl"), ("torque_fl", "torque_rl")]
+)
+def test_a_torque_is_that_of_one_axle_unless_a_scale_gives_each_its_part(tmp_path, one, other):
+    with pytest.raises(ConfigError, match=f"{other} names channel"):
+        load_signal_map(write(tmp_path, f'[signals]\n{one} = "M"\n{other} = "M"\n'))
+    half = '{ channel = "M", scale = 0.5 }'
+    assert len(load_signal_map(write(tmp_path, f"[signals]\n{one} = {half}\n{other} = {half}\n")).entries) == 2
+
+
 def test_how_csv_files_are_written(tmp_path):
     text = '[csv]\nseparator = "tab"\nencoding = "latin-1"\n[csv."gps*.csv"]\ndecimal = ","\n[signals]\n'
     found = load_signal_map(write(tmp_path, text))

@@ -1,10 +1,15 @@
 """Which folders are one recording."""
 
+import os
+from pathlib import Path
+
+import polars as pl
 import pytest
 
 from aqualog.core.errors import LogError
 from aqualog.face.arguments import expand
-from aqualog.io.open_log import sniff
+from aqualog.io.fingerprint import hash_of
+from aqualog.io.open_log import open_log, sniff
 
 ONE = (["a_0.mcap", "a_1.mcap"], ["a.db3"], ["a.mcap"], ["a_0.db3", "notes.txt"], ["metadata.yaml"])
 SEVERAL = (
@@ -31,3 +36,13 @@ def test_a_folder_of_drives_is_none(names, tmp_path):
         sniff(tmp_path)
     if names:
         assert [p.name for p in expand([str(tmp_path)])] == sorted(names)
+
+
+def test_a_name_that_is_no_text(tmp_path):
+    """Bytes that are not UTF-8: a hash takes them, and Parquet, whose library does not, says so."""
+    path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/bad\xff.parquet"))
+    pl.DataFrame({"t": [0.0, 0.1], "v_x": [1.0, 2.0]}).write_parquet(tmp_path / "good.parquet")
+    (tmp_path / "good.parquet").rename(path)
+    assert len(hash_of([str(path)])) == len(hash_of(["good"]))
+    with pytest.raises(LogError, match="its name is not UTF-8"):
+        open_log(path)

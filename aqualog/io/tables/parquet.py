@@ -161,6 +161,11 @@ class ParquetReader(TableReader):
     def __init__(self, path: Path, options: ReadOptions) -> None:
         super().__init__(path)
         self._unit: str | None = None
+        try:
+            str(path).encode()
+        except UnicodeEncodeError as error:
+            what = "its name is not UTF-8, which the Parquet library cannot open"
+            raise LogError(what, where=str(path), hint="rename it") from error
         schema, metadata = self._wrapped(lambda: _head(path))
         self._rows: int = self._wrapped(
             lambda: int(pl.scan_parquet(path, glob=False).select(pl.len()).collect().item())
