@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from aqualog.checks.speeds import scale_doubts
 from aqualog.checks.standstill import OFFSETS, offsets
 from aqualog.checks.windows import Gather
 from aqualog.core.records import Signals
@@ -20,8 +21,10 @@ def without_offsets(signals: Signals, vehicle: Vehicle) -> Signals:
     own = [s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height]
     gather = Gather(own, vehicle, signals.dt)
     gather.push({s: signals.array(s) for s in own})
-    found = offsets(gather.windows())
-    notes, taken = [], [o for o in found if o.counts]
+    windows = gather.windows()
+    wrong = {s for d in scale_doubts(windows) for s in d.signals}
+    found = offsets(windows)
+    notes, taken = [], [o for o in found if o.counts and o.symbol not in wrong]
     for o in taken:
         kind = OFFSETS[o.symbol]
         value, low, high = (f"{x:+.{kind.digits}f}" for x in (o.value, *o.ci95))

@@ -14,6 +14,7 @@ from aqualog.checks.windows import EXTRA, Windows
 from aqualog.core.intervals import half_width
 from aqualog.core.notation import AXLES
 from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import KEYS, Vehicle
 
 __all__ = ["drive_doubts"]
 
@@ -80,11 +81,19 @@ def _gain(windows: Windows) -> Iterator[Doubt]:
     if gain < 0.0:
         advice = "check the sign of the torques in the signal map"
     else:
-        advice = (
-            f"in the vehicle file torque_gain = {gain * car.torque_gain:.3g}, or mass = {car.mass / gain:.0f}; "
-            "`aqualog calibrate` estimates them"
-        )
+        advice = _gain_advice(gain, car, axles)
     yield Doubt("torque", ("torque_gain", "mass"), what, advice, value=gain, ci95=(low, high))
+
+
+def _gain_advice(gain: float, car: Vehicle, axles: list[str]) -> str:
+    """Return what to write into the vehicle file; beyond its limits the map is wrong, not the car."""
+    values = {"torque_gain": gain * car.torque_gain, "mass": car.mass / gain}
+    if all(KEYS[n].low <= x <= KEYS[n].high for n, x in values.items()):
+        own = f"torque_gain = {values['torque_gain']:.3g}, or mass = {values['mass']:.0f}"
+        return f"in the vehicle file {own}; `aqualog calibrate` estimates them"
+    size = f"{1.0 / gain:.3g} times too large" if gain < 1.0 else f"{gain:.3g} times too small"
+    names = " and ".join(f"torque_{a}" for a in axles)
+    return f"check unit and scale of {names} in the map: {'it is' if len(axles) == 1 else 'they are'} {size}"
 
 
 def _slope(x: FloatArray, drag: FloatArray, y: FloatArray, good: BoolArray) -> tuple[float, float] | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,12 +13,14 @@ from aqualog.checks.signs import sign_doubts
 from aqualog.checks.slip import in_turn, is_of_wheels
 from aqualog.checks.speeds import scale_doubts
 from aqualog.checks.standstill import offset_doubts
+from aqualog.checks.turning import turning_scale_doubts
 from aqualog.checks.windows import EXTRA, Gather, Windows
 from aqualog.core.records import FloatArray, Origin, Remark, Signals
 from aqualog.core.vehicle import Vehicle
 
 __all__ = ["Checks", "look"]
 
+_SCALED = ("yaw_rate", "a_y")
 _JUDGED = (14.0, -1.0)  # [m/s], [m/s^2] above which the measure of the resistance means something
 
 
@@ -62,8 +65,23 @@ def look(signals: Signals, vehicle: Vehicle) -> tuple[Remark, ...]:
 
 
 def _doubts(windows: Windows) -> list[Doubt]:
-    parts = (sign_doubts(windows), offset_doubts(windows), scale_doubts(windows), drive_doubts(windows))
-    found = [d for part in parts for d in part]
+    scales = [*scale_doubts(windows)]
+    are_speeds_right = all(d.signals == ("a_x",) and d.ways for d in scales)
+    scales += turning_scale_doubts(windows, are_speeds_right=are_speeds_right)
+    # what hangs on a wrong scale or channel is no fault of its own: signs are judged with the scale put right
+    signs = [*sign_doubts(_scaled(windows, scales))]
+    offsets = [*offset_doubts(windows)]
+    absurd = {d.signals for d in offsets if d.kind == "channel"} - {d.signals for d in scales}
+    signs = [d for d in signs if d.signals not in absurd]
+    wrong = {s for d in (*scales, *signs) if d.kind in ("scale", "channel") for s in d.signals}
+    rest = windows.without(wrong & {"a_x"} and {"a_x", EXTRA})
+    found = [*signs, *(d for d in offsets if not wrong & {*d.signals}), *scales, *drive_doubts(rest)]
     # one exchange of wheels at a time: lines for two of them would not fit each other
     wheels = sorted((d for d in found if is_of_wheels(d)), key=in_turn)
     return [d for d in found if d not in wheels[1:]]
+
+
+def _scaled(windows: Windows, scales: Sequence[Doubt]) -> Windows:
+    """Return the windows with the yaw rate and a_y in the scale that the doubts give them."""
+    factors = {s: c.factor for d in scales if len(d.ways) == 1 for s, c in d.ways[0].items() if s in _SCALED}
+    return replace(windows, columns={n: x * factors.get(n, 1.0) for n, x in windows.columns.items()})

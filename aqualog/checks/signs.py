@@ -14,16 +14,19 @@ import numpy as np
 
 from aqualog.checks.course import turning_by_course
 from aqualog.checks.doubts import Change, Doubt, exchanged
+from aqualog.checks.follows import follow
 from aqualog.checks.relations import Relation, changes, relate
 from aqualog.checks.windows import Windows
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import FloatArray
 
-__all__ = ["sign_doubts"]
+__all__ = ["LATERAL", "named", "sign_doubts", "witnesses"]
 
 AGAINST = 0.4  # correlation from which a signal is called turned: noise and delays weaken it, nothing turns it
 TOGETHER = 0.3  # from which a signal is a witness: wheel speeds in steps of 0.1 km/h show no more
 LONGITUDINAL = 0.10  # [m/s^2] changes of less are no driving
+MOTION = 0.3  # [m/s^2] standard deviation of the change of dv/dt: less may be the resolution of the speed
+UNRELATED = 0.4  # correlation below which an accelerometer shows another axis: noise and a second of delay leave more
 LATERAL = 0.06  # [m/s^2] changes of less are no steering, but wind and the crown of the road
 MOVING = 3.0  # [m/s] below, wheels stand or go backwards without a sign
 BANKED, LITTLE = 1.0, 0.3  # [m/s^2] a bend on which banks may count, and what is no bend the other way
@@ -70,11 +73,17 @@ def _forward(windows: Windows, speed: FloatArray) -> Iterator[Doubt]:
         by = "the wheels' acceleration" if windows.wheels else "the change of v_x"
         what = f"a_x has the opposite sign of {by} (correlation {found.r:.2f})"
         yield Doubt("sign", ("a_x",), what, ways=({"a_x": TURN},), value=found.r)
+        return
+    a_x = windows["a_x"]
+    own = follow(a_x, speed, np.isfinite(a_x) & np.isfinite(speed), step)
+    if own is not None and own.motion > MOTION and abs(own.correlation) < UNRELATED:
+        what = f"a_x does not follow the change of the speed (correlation {own.correlation:.2f}): another channel?"
+        yield Doubt("channel", ("a_x",), what, value=own.correlation)
 
 
 def _turning(windows: Windows, speed: FloatArray) -> Iterator[Doubt]:
     step = windows.step_s
-    seen = {n: changes(x, step) for n, x in _witnesses(windows, speed).items()}
+    seen = {n: changes(x, step) for n, x in witnesses(windows, speed).items()}
     relations = {(a, b): relate(seen[a], seen[b], step, least=LATERAL) for a, b in combinations(seen, 2)}
     yield from _crossed(windows, speed, seen, relations)
     for one, other in _camps(relations):
@@ -114,14 +123,17 @@ def _crossed(
         return
     one, other = ("omega_fl", "omega_rr") if weakest.r > 0.0 else ("omega_fr", "omega_rl")
     what = (
-        f"{one} and {other} look exchanged: the differences of front and rear wheels follow {_named(by)} (correlation "
+        f"{one} and {other} look exchanged: the differences of front and rear wheels follow {named(by)} (correlation "
         f"{weakest.r:.2f}), those of left and right wheels do not"
     )
     yield Doubt("exchange", (one, other), what, ways=(exchanged(one, other),), value=weakest.r)
 
 
-def _witnesses(windows: Windows, speed: FloatArray) -> dict[str, FloatArray]:
-    """Return the lateral acceleration (n,) that each witness of turning stands for, where the car moves. [m/s²]"""
+def witnesses(windows: Windows, speed: FloatArray, *, on_banks: bool = False) -> dict[str, FloatArray]:
+    """Return the lateral acceleration (n,) that each witness of turning stands for, where the car moves. [m/s²]
+
+    Without a_y on an oval, as its sign means nothing there; with it if `on_banks`.
+    """
     car = windows.vehicle
     wheels = windows.wheels
     v = np.where(speed > MOVING, speed, np.nan)
@@ -142,7 +154,7 @@ def _witnesses(windows: Windows, speed: FloatArray) -> dict[str, FloatArray]:
             found[axle] = v * (wheels[right] - wheels[left]) / car.track
     if "latitude" in windows and "longitude" in windows:
         found["course"] = turning_by_course(windows["latitude"], windows["longitude"], v, windows.step_s)
-    if any(_is_oval(x) for n, x in found.items() if n != "a_y"):
+    if not on_banks and any(_is_oval(x) for n, x in found.items() if n != "a_y"):
         found.pop("a_y", None)
     return found
 
@@ -202,7 +214,7 @@ def _opposite(name: str, right: Collection[str], relations: Mapping[tuple[str, s
 
 
 def _undecided(one: set[str], other: set[str], relations: Mapping[tuple[str, str], Relation]) -> Doubt:
-    told = " and ".join(_named(n) for n in sorted(one))
+    told = " and ".join(named(n) for n in sorted(one))
     first = min(one, key=lambda n: _against(n, other, relations)[1])
     against, r = _against(first, other, relations)
     verb = "have" if len(one) > 1 or one <= {"front", "rear"} else "has"
@@ -226,7 +238,7 @@ def _exchanged(turned: Sequence[str], right: Collection[str], relations: Mapping
     told, r = _against(turned[0], right, relations)
     names = ", ".join(" and ".join(_PAIRS[n]) for n in turned)
     verb = "has" if turned == ["course"] else "have"
-    what = f"{names} look exchanged: {' and '.join(_named(n) for n in turned)} {verb} the opposite sign of {told}"
+    what = f"{names} look exchanged: {' and '.join(named(n) for n in turned)} {verb} the opposite sign of {told}"
     symbols = tuple(s for n in turned for s in _PAIRS[n])
     return Doubt("exchange", symbols, what, ways=(_way(turned),), value=r)
 
@@ -236,12 +248,13 @@ def _against(name: str, others: Collection[str], relations: Mapping[tuple[str, s
     pairs = {o: relations.get((name, o)) or relations.get((o, name)) for o in sorted(others)}
     found = {o: r.r for o, r in pairs.items() if r is not None and r.r < 0.0}
     if not found:
-        return " and of ".join(_named(o) for o in pairs), math.nan
+        return " and of ".join(named(o) for o in pairs), math.nan
     first = min(found, key=lambda o: found[o])
-    rest = [_named(o) for o in pairs if o != first]
-    told = f"{_named(first)} (correlation {found[first]:.2f})" + (f" and of {', '.join(rest)}" if rest else "")
+    rest = [named(o) for o in pairs if o != first]
+    told = f"{named(first)} (correlation {found[first]:.2f})" + (f" and of {', '.join(rest)}" if rest else "")
     return told, found[first]
 
 
-def _named(witness: str) -> str:
+def named(witness: str) -> str:
+    """Return what a witness of turning is called in a sentence."""
     return _NAMES.get(witness, witness)

@@ -23,14 +23,20 @@ APART = 50.0  # [m] driven between two stops at different places
 PRIOR = 4.0  # stops that the usual slope counts as
 MOVED = 5.0  # [m/s] a speed that never gets there shows no stop
 LEAST_MOVED_S = 20.0
+MOST_ACCELERATION = 3.0  # [m/s^2] a sensor that is mounted 18 deg off level
+MOST_YAW_RATE = 0.1  # [rad/s] 6 deg/s: twice what data sheets of car gyros allow (K)
 
 
 @dataclass(frozen=True, slots=True)
 class _Kind:
-    """`usual`: how stops differ, one standard deviation; `noted`: an offset surely beyond is reported; `digits`."""
+    """`usual`: how stops differ, one standard deviation; `noted`: an offset surely beyond is reported; `digits`.
+
+    `most`: what no offset of such a sensor reaches; a mean beyond is another unit or another channel.
+    """
 
     usual: float
     noted: float
+    most: float
     unit: str
     digits: int
     because: str
@@ -38,11 +44,11 @@ class _Kind:
 
 OFFSETS = {
     # the slope of the places where cars stop: 2.5 %; more than 3 % on average is no slope any more
-    "a_x": _Kind(0.25, 0.3, "m/s²", 2, "the slope of the road is in the interval"),
+    "a_x": _Kind(0.25, 0.3, MOST_ACCELERATION, "m/s²", 2, "the slope of the road is in the interval"),
     # 2.5 % more: the crown of a road is on the same side at every stop
-    "a_y": _Kind(0.25, 0.55, "m/s²", 2, "the crossfall of the road is in the interval"),
+    "a_y": _Kind(0.25, 0.55, MOST_ACCELERATION, "m/s²", 2, "the crossfall of the road is in the interval"),
     # 0.6 deg/s: at 30 m/s as much lateral acceleration as the offset of a_y that counts
-    "yaw_rate": _Kind(0.002, 0.01, "rad/s", 4, ""),
+    "yaw_rate": _Kind(0.002, 0.01, MOST_YAW_RATE, "rad/s", 4, ""),
 }
 """Signals that are zero at standstill on level ground."""
 
@@ -62,7 +68,12 @@ class Offset:
         """Whether it surely is beyond what does no harm."""
         low, high = self.ci95
         noted = OFFSETS[self.symbol].noted
-        return low > noted or high < -noted
+        return (low > noted or high < -noted) and not self.is_absurd
+
+    @property
+    def is_absurd(self) -> bool:
+        """Whether no sensor has it: it shows another unit or another channel."""
+        return abs(self.value) > OFFSETS[self.symbol].most
 
 
 def offsets(windows: Windows) -> list[Offset]:
@@ -89,11 +100,15 @@ def offsets(windows: Windows) -> list[Offset]:
 
 
 def offset_doubts(windows: Windows) -> Iterator[Doubt]:
-    """Yield the offsets that count."""
+    """Yield the offsets that count, and means that are no offset: of the kind `channel`."""
     for o in offsets(windows):
+        kind = OFFSETS[o.symbol]
+        if o.is_absurd:
+            what = f"{o.symbol} shows {o.value:+.{kind.digits}f} {kind.unit} at standstill; no sensor is so far off"
+            advice = f"check its channel and unit in the signal map (an offset is at most {kind.most:g} {kind.unit})"
+            yield Doubt("channel", (o.symbol,), what, advice, value=o.value, ci95=o.ci95)
         if not o.counts:
             continue
-        kind = OFFSETS[o.symbol]
         value, low, high = (f"{x:+.{kind.digits}f}" for x in (o.value, *o.ci95))
         places = "place" if o.stops == 1 else "places"
         what = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,6 +35,10 @@ class Windows:
 
     def __contains__(self, name: str) -> bool:
         return name in self.columns
+
+    def without(self, names: Collection[str]) -> Windows:
+        """Return the windows without some columns."""
+        return replace(self, columns={n: x for n, x in self.columns.items() if n not in names})
 
     @property
     def wheels(self) -> dict[str, FloatArray]:

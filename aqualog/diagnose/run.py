@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.checks.follows import Follow
 from aqualog.core.errors import SignalError
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
@@ -15,7 +16,7 @@ from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, widened
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.consequence import consequences
-from aqualog.diagnose.defects import Defect, accelerometer_defect
+from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
 from aqualog.diagnose.evidence import Evidence, Stack, without_deviations
 from aqualog.diagnose.gain import measured_gain
@@ -323,7 +324,7 @@ def _prepared(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle) -> tuple[
     return out, tuple(notes)
 
 
-def _words(drive: Drive, defect: Defect, signals: Signals) -> str:
+def _words(drive: Drive, defect: Follow, signals: Signals) -> str:
     origin = signals.origins.get("a_x")
     channel = origin.channel if origin is not None else "a_x"
     return (

@@ -125,3 +125,12 @@ def test_of_two_exchanges_the_first_comes_first():
     both = {f"omega_{a}": f"omega_{b}" for a, b in (("fl", "rr"), ("fr", "rl"), ("rl", "fr"), ("rr", "fl"))}
     (remark,) = exchanged({**DRIVE, **{a: DRIVE[b] for a, b in both.items()}})
     assert set(remark.lines) == lines_for(("omega_fl", "omega_fr"), ("omega_rl", "omega_rr"))
+
+
+def test_beyond_the_limits_of_the_vehicle_file_the_map_is_in_doubt():
+    """No torque_gain of 0.01 and no mass of 165 t: a file with them would be refused."""
+    (remark,) = [r for r in said(**dict.fromkeys(TORQUES, 100.0)) if r.kind == "torque"]
+    assert remark.advice.startswith("check unit and scale of torque_r in the map: it is ")
+    assert remark.advice.endswith(" times too large")
+    assert "torque_gain =" not in remark.sentence
+    assert "mass =" not in remark.sentence
