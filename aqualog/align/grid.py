@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -172,21 +172,29 @@ class Grid(NamedTuple):
         return np.asarray((self.points(first, last) - self.start_ns) * 1e-9)
 
 
-def common_clock(clocks: Sequence[tuple[str, bool]], signal_map: SignalMap) -> bool:
+def common_clock(
+    clocks: Sequence[tuple[str, bool]],
+    signal_map: SignalMap,
+    *,
+    with_speed: Collection[str] = (),
+    dbc: Sequence[str] = (),
+) -> bool:
     """Return whether the drive has absolute time; refuse to join clocks that have nothing in common.
 
     `clocks` holds the file of each signal and whether its time is absolute. A file whose offset the map gives is
-    already on the others' clock.
+    already on the others' clock. `with_speed`: files that carry one, by which clocks can be compared.
     """
     free = [c for c in clocks if not signal_map.joins(c[0])]
     kinds = {absolute for _, absolute in free or clocks}
     if len(kinds) > 1:
         by_kind = {k: sorted({file for file, absolute in clocks if absolute == k}) for k in kinds}
+        speeds = {k: [f for f in files if f in with_speed] for k, files in by_kind.items()}
+        compared = speeds if all(speeds.values()) else by_kind
         raise SignalError(
             "the files do not share a clock",
             where=", ".join(by_kind[False]),
             expected=f"absolute time as in {', '.join(by_kind[True])}",
-            hint=align_command([*by_kind[True], *by_kind[False]], signal_map.path),
+            hint=align_command([*compared[True], *compared[False]], signal_map.path, dbc),
         )
     return kinds.pop()
 

@@ -65,8 +65,9 @@ class _Request(NamedTuple):
 
     def read(self, log: DriveLog, found: Found) -> Signals:
         return read_signals(
-            log, found, signal_map=self.signal_map, vehicle=self.vehicle, rate_hz=self.rate_hz, report=self.report
-        )
+            log, found, signal_map=self.signal_map, vehicle=self.vehicle, rate_hz=self.rate_hz, report=self.report,
+            dbc=[str(d) for d in self.dbc],
+        )  # fmt: skip
 
     def in_windows(self, log: DriveLog, found: Found, stack: ExitStack) -> LoadedLong:
         wanted = [info for _, info in found.values()]
@@ -80,6 +81,7 @@ class _Request(NamedTuple):
 
         drive = long_drive(
             found, parts, signal_map=self.signal_map, vehicle=self.vehicle, rate_hz=self.rate_hz,
+            dbc=[str(d) for d in self.dbc],
             tell=lambda done: self.report(f"going through the signals, {100 * done // total} %"),
         )  # fmt: skip
         return LoadedLong(drive, (*log.faults, *idle_files(log, found)), stack)
@@ -196,6 +198,7 @@ def read_signals(
     vehicle: Vehicle,
     rate_hz: float | None,
     report: Callable[[str], None],
+    dbc: Sequence[str] = (),
 ) -> Signals:
     """Build the table of channels that `find_channels` has found in an open log."""
     report(f"reading {len(found)} channels")
@@ -204,7 +207,7 @@ def read_signals(
     log.close()
     report("aligning")
     mapped = {s: (entry, channels[info.file, info.path]) for s, (entry, info) in found.items()}
-    return build_signals(mapped, signal_map=signal_map, vehicle=vehicle, file_faults=faults, rate_hz=rate_hz)
+    return build_signals(mapped, signal_map=signal_map, vehicle=vehicle, file_faults=faults, rate_hz=rate_hz, dbc=dbc)
 
 
 def idle_files(log: DriveLog, found: Found) -> list[FileFaults]:

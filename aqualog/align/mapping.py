@@ -90,9 +90,10 @@ def _names(pattern: str, file: str) -> bool:
     return fnmatchcase(file, pattern) or file.rsplit(".", 1)[0] == pattern
 
 
-def align_command(logs: Sequence[str], map_path: str = "") -> str:
-    """Return what to type where the clocks of files of one drive disagree."""
+def align_command(logs: Sequence[str], map_path: str = "", dbc: Sequence[str] = ()) -> str:
+    """Return what to type where the clocks of files of one drive disagree; `dbc` are those the logs were read with."""
     signals = f" --signals {shlex.quote(map_path)}" if map_path else ""
+    signals += "".join(f" --dbc {shlex.quote(d)}" for d in dbc)
     out = "clocks.toml" if map_path.endswith("map.toml") else "map.toml"
     return (
         f"`aqualog align {' '.join(shlex.quote(log) for log in logs)}{signals} --write-map {out}`, "

@@ -35,7 +35,7 @@ from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.core.records import Channel, FloatArray, TimeArray
 from aqualog.core.units import is_unit, parse_unit
 
-__all__ = ["CANONICAL", "Look", "Proposal", "look_at", "propose_map", "words_of"]
+__all__ = ["CANONICAL", "NOT_A_VALUE", "Look", "Proposal", "look_at", "propose_map", "words_of"]
 
 
 CANONICAL = "its canonical name"
@@ -47,10 +47,12 @@ _POSITIONS = {
     "rl": ("rl", "hl", "lr", "rear left", "left rear", "hinten links", "rearleft", "leftrear"),
     "rr": ("rr", "hr", "rear right", "right rear", "hinten rechts", "rearright", "rightrear"),
 }
-_NOT_A_VALUE = {
+NOT_A_VALUE = {
     "fault", "valid", "status", "qbit", "counter", "checksum", "crc", "flag", "state", "error", "quality", "accuracy",
     "offset", "sensor", "max", "min", "req", "request", "requested", "target", "displayed", "init", "initializing",
+    "alive", "cnt", "lockout", "parity", "encoder",
 }  # fmt: skip
+"""Words of channels that tell of a signal, a message or a wish, but hold no measured value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,7 +280,7 @@ def _wheel_candidate(
     has_position = any(p in name if " " not in p else p in joined for p in positions)
     has_word = set(rule.words) & set(words_of(channel.info.path)) or any(w in joined for w in rule.words if len(w) > 4)
     dimension = _dimension(channel)
-    if not has_position or not has_word or set(name) & _NOT_A_VALUE or dimension not in (*rule.dimensions, ""):
+    if not has_position or not has_word or set(name) & NOT_A_VALUE or dimension not in (*rule.dimensions, ""):
         return None
     score = 3.0 + ("speed" in joined or "spd" in joined) - 2.0 * (dimension == "")
     return _proposal(f"{rule.quantity}_{wheel}", channel, channels, score)
@@ -290,7 +292,7 @@ def _candidate(rule: _Rule, channel: Channel, channels: _Named) -> Proposal | No
     dimension = _dimension(channel)
     named = _has(rule.words, words) or (set(rule.words) & path_words and set(rule.bonus) & set(words))
     never = set(rule.never) & set(words) or _has([w for w in rule.never if len(w) > 4], words)
-    if not named or never or set(words) & _NOT_A_VALUE:
+    if not named or never or set(words) & NOT_A_VALUE:
         return None
     # a channel without a unit is proposed only where its name says which quantity it is
     is_clear = dimension == "" and (rule.fallback_unit or rule.symbol == "gear" or _is_measured(rule, channel, words))
@@ -313,7 +315,7 @@ def _lane_candidate(channel: Channel, channels: _Named) -> Proposal | None:
     """Propose a channel that is 0 or 1 and is named after a wet lane or the light barriers at its ends."""
     words = words_of(channel.info.name)
     named = _has(_LANE_WORDS, words) or any(w in " ".join(words) for w in _LANE_WORDS if " " in w)
-    if not named or set(words) & (_NOT_A_VALUE - _LANE_FLAGS) or channel.info.unit == "%":
+    if not named or set(words) & (NOT_A_VALUE - _LANE_FLAGS) or channel.info.unit == "%":
         return None
     finite = channel.values[np.isfinite(channel.values)]
     if _dimension(channel) not in ("", "ratio") or not finite.size or not np.isin(finite, (0.0, 1.0)).all():

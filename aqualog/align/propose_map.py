@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from aqualog.align.mapping import OF_SEPARATE_DRIVES, Entry, SignalMap, matching, separate_drives
-from aqualog.align.propose import CANONICAL, Proposal, look_at, words_of
+from aqualog.align.propose import CANONICAL, NOT_A_VALUE, Proposal, look_at, words_of
 from aqualog.core.errors import AqualogError, listed
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import ChannelInfo
-from aqualog.core.units import is_unit
+from aqualog.core.units import is_unit, parse_unit
 from aqualog.io.open_log import DriveLog
 from aqualog.io.reader import ReadOptions
 
@@ -195,19 +195,42 @@ def lacking_notes(found: Collection[str], unmapped: Sequence[str]) -> list[str]:
             "no torque of wheels or axles: traction and slip slope need one (a driveline torque with its scale)"
         )
 
-    def is_road_speed(words: set[str]) -> bool:
-        return bool({"speed", "velocity"} & words) and not _NO_ROAD_SPEED & words
-
     if "v_x" not in found:
-        speeds = [n for n in unmapped if "[" not in n and is_road_speed(set(words_of(n)))]
-        hint = (
-            f"; {', '.join(speeds[:3])} may be it, but the file gives no unit: map it with its unit" if speeds else ""
-        )
-        notes.append(f"no v_x: slip refers to the free wheels, not to the road{hint}")
+        notes.append(f"no v_x: slip refers to the free wheels, not to the road{_speed_hint(unmapped)}")
     return notes
 
 
-_NO_ROAD_SPEED = {"wheel", "whl", "engine", "fan", "wind", "accuracy", "limit", "motor", "rad"}
+def _speed_hint(unmapped: Sequence[str]) -> str:
+    """Name the channels, `name [unit]`, that may be the speed over ground: those with a unit of speed first."""
+    speeds, bare = [], []
+    for name, _, unit in (n.removesuffix("]").partition(" [") for n in unmapped):
+        words = set(words_of(name))
+        if not {"speed", "velocity"} & words or (_NO_ROAD_SPEED | NOT_A_VALUE) & words:
+            continue
+        if unit and is_unit(unit) and parse_unit(unit).dimension == "speed":
+            speeds.append(f"{name} [{unit}]")
+        elif not unit:
+            bare.append(name)
+    if speeds:
+        return f"; {', '.join(speeds[:3])} may be it: map it if it is not made from the wheels"
+    return f"; {', '.join(bare[:3])} may be it, but the file gives no unit: map it with its unit" if bare else ""
+
+
+_NO_ROAD_SPEED = {
+    "wheel",
+    "whl",
+    "engine",
+    "fan",
+    "wind",
+    "accuracy",
+    "limit",
+    "motor",
+    "rad",
+    "set",
+    "cruise",
+    "ui",
+    "steer",
+}
 
 
 def _unmapped(kinds: _Kinds, mapped: Sequence[tuple[str, ...]]) -> tuple[str, ...]:

@@ -182,6 +182,7 @@ def build_signals(
     vehicle: Vehicle,
     file_faults: Sequence[FileFaults] = (),
     rate_hz: float | None = None,
+    dbc: Sequence[str] = (),
 ) -> Signals:
     """Bring the mapped channels of one drive onto one integer-nanosecond grid.
 
@@ -224,7 +225,7 @@ def build_signals(
         return taken
 
     found = {name: (entry, channel.info) for name, (entry, channel) in mapped.items()}
-    plan = plan_drive(found, take, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz)
+    plan = plan_drive(found, take, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, dbc=dbc)
     table, bridged = plan.table(samples)
     missing = {name: table.frame[name].null_count() for name in plan.symbols}
     facts = plan.facts(missing, frozenset(name for name, gaps in bridged.items() if gaps), file_faults)
@@ -239,6 +240,7 @@ def plan_drive(
     vehicle: Vehicle,
     rate_hz: float | None = None,
     most_rows: int = MAX_ROWS,
+    dbc: Sequence[str] = (),
 ) -> Plan:
     """Clean the signals of a drive and plan its grid.
 
@@ -275,7 +277,9 @@ def plan_drive(
             (cleaned if clean.span.samples else empty).append(clean)
     if not cleaned:
         raise _nothing_usable([*faults.values(), *(_why_empty(c.origin) for c in empty)], found)
-    absolute = common_clock([(c.origin.file, taken[c.origin.symbol].absolute) for c in cleaned], signal_map)
+    clocks = [(c.origin.file, taken[c.origin.symbol].absolute) for c in cleaned]
+    with_speed = {c.origin.file for c in cleaned if c.origin.symbol in SPEEDS}
+    absolute = common_clock(clocks, signal_map, with_speed=with_speed, dbc=dbc)
     grid = grid_of(cleaned, rate_hz, most_rows=most_rows)
     return Plan(grid, absolute, tuple(cleaned), tuple(notes), unmeasured, vehicle)
 

@@ -79,6 +79,7 @@ def long_drive(
     signal_map: SignalMap,
     vehicle: Vehicle,
     rate_hz: float | None = None,
+    dbc: Sequence[str] = (),
     tell: Callable[[int], None] = lambda _: None,
 ) -> LongDrive:
     """Read the files once and plan the windows, of channels as `resolve` finds them; the rest as of `build_signals`.
@@ -109,7 +110,9 @@ def long_drive(
             signal.finish()
         return {name: signal.taken() for name, signal in signals.items()}
 
-    plan = plan_drive(found, take, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, most_rows=_MAX_ROWS)
+    plan = plan_drive(
+        found, take, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, most_rows=_MAX_ROWS, dbc=dbc
+    )
     return LongDrive(plan, {c.origin.symbol: found[c.origin.symbol] for c in plan.cleaned}, parts, signal_map)
 
 

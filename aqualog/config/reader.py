@@ -43,6 +43,12 @@ _PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 _DEEP = re.compile(rf"""(?:^|[\[{{,])[ \t]*+{_PART}(?:\.[ \t]*+{_PART}){{{_MOST_PARTS}}}""", re.MULTILINE)
 _HEADER = re.compile(r"""^\s*\[\[?\s*([A-Za-z_"'][^\[\],=]*?)\s*\]\]?\s*(#.*)?$""")
 
+_MARKS = {
+    "campaign file": ("run", "runs"), "signal map": ("signals", "sources"), "model file": ("term",),
+    "vehicle file": ("drivetrain", "mass", "l_f", "l_r", "wheels"),
+}  # fmt: skip
+"""Keys that show which file this is."""
+
 T = TypeVar("T")
 
 
@@ -111,7 +117,21 @@ def read(path: Path, what: str) -> Table:
         raise ConfigError(f"{what} is nested deeper than {DEEPEST} levels", where=str(path)) from error
     except ValueError as error:  # also numbers of thousands of digits
         raise ConfigError(f"{what} is not valid TOML: {_at_key(error, text)}", where=str(path)) from error
+    kind = _kind_of(document, what)
+    if kind != what:
+        raise ConfigError(f"this is a {kind}", where=str(path), expected=f"a {what}")
     return Table(document, Faults(path), lines=text.splitlines())
+
+
+def _kind_of(document: Mapping[str, Any], what: str) -> str:
+    """Return what a file is by its keys: `what` if it has one of that, if it is none of `_MARKS`, or if no key says."""
+    # a campaign file names its map: `signals = "map.toml"`
+    kinds = [k for k, marks in _MARKS.items() if any(n in document and _is_mark(n, document[n]) for n in marks)]
+    return what if what not in _MARKS or what in kinds or not kinds else kinds[0]
+
+
+def _is_mark(name: str, value: Any) -> bool:
+    return name not in _MARKS["signal map"] or isinstance(value, dict)
 
 
 def _at_key(error: ValueError, text: str) -> str:

@@ -84,7 +84,7 @@ def _numbers(table: Table, section: str, names: Iterable[str], values: dict[str,
             own = f"expected [{name}], a table of its own" if name in POLYNOMIALS else "expected above all tables"
             table.add(name, f"{name} stands in [{section}]; {own}")
         else:
-            table.unknown(name, known)
+            table.unknown(name, known if section else [*known, *_TABLES_AND_WORDS])
 
 
 def _provenance(table: Table, given: set[str]) -> dict[str, Provenance]:

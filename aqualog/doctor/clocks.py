@@ -35,7 +35,9 @@ def on_clock(speed: Quantity, signal_map: SignalMap) -> Quantity:
     return replace(speed, t_ns=corrected(speed.t_ns, signal_map, speed.file))
 
 
-def clock_findings(speeds: Sequence[Quantity], paths: Mapping[str, str], map_path: str) -> Iterator[Finding]:
+def clock_findings(
+    speeds: Sequence[Quantity], paths: Mapping[str, str], map_path: str, dbc: Sequence[str] = ()
+) -> Iterator[Finding]:
     """Yield findings for each file whose clock runs at another rate than the first one's, or differs by an offset.
 
     Parameters
@@ -44,6 +46,8 @@ def clock_findings(speeds: Sequence[Quantity], paths: Mapping[str, str], map_pat
     paths : mapping file name -> path
     map_path : str
         Signal map of the drive; empty without one.
+    dbc : sequence of str
+        Databases that the logs were read with.
 
     Clocks are not compared where the match of the speeds is weak or their common time short.
     """
@@ -58,6 +62,8 @@ def clock_findings(speeds: Sequence[Quantity], paths: Mapping[str, str], map_pat
             )  # fmt: skip
         except FitError:
             continue
+        logs = [paths.get(s.file, s.file) for s in (reference, source)]
+        advice = align_command(logs, map_path, dbc)
         shift = fit.drift_ppm * 1e-6 * fit.overlap_s
         if fit.drift_significant and abs(shift) > _LEAST_SHIFT_S:
             low, high = fit.drift_ppm_ci95
@@ -65,9 +71,7 @@ def clock_findings(speeds: Sequence[Quantity], paths: Mapping[str, str], map_pat
                 f"its clock drifts by {fit.drift_ppm:+.0f} ppm (95 % {low:+.0f} to {high:+.0f}) against "
                 f"{reference.file}, {shift:+.3f} s over {fit.overlap_s:.0f} s, by the speed in both"
             )
-            yield Finding(
-                "doubt", "drifts", source.file, source.label, what, _advice(paths, map_path, reference, source), 1
-            )
+            yield Finding("doubt", "drifts", source.file, source.label, what, advice, 1)
         low, high = fit.offset_ci95
         if not apart and low * high > 0.0 and min(abs(low), abs(high)) > _SENSOR_S:
             side = "after" if fit.offset_s > 0.0 else "before"
@@ -75,11 +79,4 @@ def clock_findings(speeds: Sequence[Quantity], paths: Mapping[str, str], map_pat
                 f"its speed comes {abs(fit.offset_s):.2f} s {side} the same in {reference.file} "
                 f"(95 % {low:+.2f} to {high:+.2f} s), by the speed in both"
             )
-            yield Finding(
-                "doubt", "offset", source.file, source.label, what, _advice(paths, map_path, reference, source), 1
-            )
-
-
-def _advice(paths: Mapping[str, str], map_path: str, *speeds: Quantity) -> str:
-    logs = [paths.get(s.file, s.file) for s in speeds]
-    return align_command(logs, map_path)
+            yield Finding("doubt", "offset", source.file, source.label, what, advice, 1)

@@ -77,7 +77,7 @@ def _examined(
     if any(f.level == "unreadable" for f in findings):
         return Examination(tuple(files), tuple(findings))
     report("looking at the drive")
-    findings += clock_findings(speeds, {p.name: str(p) for p in paths}, signal_map.path)
+    findings += clock_findings(speeds, {p.name: str(p) for p in paths}, signal_map.path, [str(d) for d in dbc])
     try:
         signals = load_signals(paths, vehicle=vehicle, signal_map=signal_map, dbc=dbc)
         result = detect_drive(signals, vehicle)

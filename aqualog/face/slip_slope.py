@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
+from aqualog.core.errors import FitError, SignalError
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, text_of
 from aqualog.face.drive import Drive, DriveLike, drive_of, sources_of, vehicle_needed
@@ -185,7 +186,12 @@ def slip_slope(
         changes = one.changes()
         hear("estimating")
         checks = look(loaded, car)
-        found = slip_slopes(loaded, car, method=method, traction=traction, mu_max=mu_max, delay=delay)
+        try:
+            found = slip_slopes(loaded, car, method=method, traction=traction, mu_max=mu_max, delay=delay)
+        except (SignalError, FitError):
+            for remark in checks:  # they often hold the cause, such as a wrong unit
+                hear.note(remark.sentence)
+            raise
     notes = (*loaded.quality.notes, *changes, *(r.sentence for r in checks))
     return SlipSlope(
         one, car, found, notes, checks, notes=(*notes, *found.notes), has_loss=loaded.quality.has_loss or bool(changes),

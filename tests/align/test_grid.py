@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from aqualog.align.grid import bin_mean, gap_limit_ns, hold, linear, placed
+from aqualog.align.grid import bin_mean, common_clock, gap_limit_ns, hold, linear, placed
+from aqualog.align.mapping import SignalMap
+from aqualog.core.errors import SignalError
 
 MS = 1_000_000
 EPOCH = 1_760_000_000_000_000_000
@@ -82,3 +84,13 @@ def test_points_are_placed_by_the_step_as_by_a_search(seed):
     last = np.searchsorted(t, points, side="right") - 1
     held = np.where(last >= 0, x[last], np.nan)
     np.testing.assert_array_equal(hold(t, x, points, gap_ns=1 << 40), held)
+
+
+def test_clocks_that_share_nothing_are_answered_with_the_files_that_have_a_speed():
+    clocks = [("can.mf4", False), ("wheels.csv", True), ("gyro.csv", True)]
+    with pytest.raises(SignalError) as error:
+        common_clock(clocks, SignalMap(), with_speed={"can.mf4", "wheels.csv"}, dbc=["my car.dbc"])
+    assert "`aqualog align wheels.csv can.mf4 --dbc 'my car.dbc' --write-map map.toml`" in error.value.hint
+    with pytest.raises(SignalError) as error:  # without a speed on both sides another quantity may do
+        common_clock(clocks, SignalMap(), with_speed={"can.mf4"})
+    assert "`aqualog align gyro.csv wheels.csv can.mf4 --write-map" in error.value.hint

@@ -4,6 +4,8 @@ import csv
 import io
 import json
 
+import numpy as np
+import polars as pl
 import pytest
 
 from aqualog.core.vehicle import vehicle_toml
@@ -170,3 +172,17 @@ def test_vehicle_must_be_given(folder):
     result = run(folder / "drive.csv")
     assert result.exit_code == 2
     assert "--vehicle" in one_error_line(result)
+
+
+def test_a_failure_shows_first_what_does_not_fit_among_the_inputs(tmp_path, folder):
+    """A channel that is no acceleration shows no slope: the user must see why."""
+    x = drive(RWD, torque=False).frame
+    noise = np.convolve(np.random.default_rng(0).standard_normal(x.height), np.ones(41) / 6.4, "same")
+    x.with_columns(a_x=pl.Series(noise)).write_csv(tmp_path / "other.csv")
+    result = run(tmp_path / "other.csv", "--vehicle", folder / "rwd.toml", "--traction", "accelerometer")
+    assert result.exit_code == 4, result.stdout
+    *notes, error = result.stderr.strip().splitlines()
+    assert error.startswith("error: ")
+    assert any(n.startswith("note: ") and "a_x does not follow the change of the speed" in n for n in notes), (
+        result.stderr
+    )

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from aqualog.config.campaign import load_campaign
 from aqualog.config.model import load_model
 from aqualog.config.reader import Faults, Key, Row
 from aqualog.config.scenario import load_scenario
@@ -82,3 +83,27 @@ def test_equal_faults_of_many_lines_are_one():
     first, second = error.value.line().removeprefix("runs.csv: ").split("; ")
     assert first == "lines 2, 3, 4, 5, 6, 7 and 4 more: depth = 'deep' is not a number"
     assert second == "line 12: depth = 'wet' is not a number"
+
+
+_FILES = {
+    "campaign file": (load_campaign, 'vehicle = "car.toml"\nsignals = "map.toml"\n[[run]]\nlog = "a.mf4"\n'),
+    "vehicle file": (load_vehicle, 'name = "car"\nmass = 1650.0\n[wheels]\nr_e_f = 0.31\n'),
+    "signal map": (load_signal_map, '[signals]\nv_x = "Speed"\n'),
+    "model file": (load_model, '[[term]]\neffect = "head_wind"\n'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("given", _FILES)
+@pytest.mark.parametrize("expected", _FILES)
+def test_a_file_in_the_place_of_another_says_what_it_is(tmp_path, given, expected):
+    (tmp_path / "x.toml").write_text(_FILES[given][1], encoding="utf-8")
+    if given != expected:
+        with pytest.raises(ConfigError) as error:
+            _FILES[expected][0](tmp_path / "x.toml")
+        assert str(error.value) == f"{tmp_path / 'x.toml'}: this is a {given}; expected a {expected}"
+
+
+def test_a_word_of_a_vehicle_file_has_a_nearest_name(tmp_path):
+    (tmp_path / "x.toml").write_text('drivetrane = "rwd"\nmass = 1650.0\n', encoding="utf-8")
+    with pytest.raises(ConfigError, match=r'unknown key "drivetrane" \(did you mean "drivetrain"\?\)'):
+        load_vehicle(tmp_path / "x.toml")

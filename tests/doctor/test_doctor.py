@@ -428,6 +428,12 @@ def test_clocks_that_disagree_are_answered_with_what_to_type(tmp_path):
     mapped = examine([wheels, gps], vehicle=CAR, signal_map=SignalMap(path="map.toml"))
     (told,) = [f for f in mapped.findings if f.kind == "offset"]
     assert "--signals map.toml --write-map clocks.toml" in told.advice
+    dbc = tmp_path / "car.dbc"
+    dbc.write_text('VERSION ""\nNS_ :\nBS_:\nBU_: A\n')
+    (told,) = [
+        f for f in examine([wheels, gps], vehicle=CAR, signal_map=SignalMap(), dbc=[dbc]).findings if f.kind == "offset"
+    ]
+    assert f"'{gps}' --dbc {dbc} --write-map map.toml" in told.advice
     assert run(*shlex.split(typed)[1:-1], tmp_path / "map.toml").exit_code == 0
     again = examine([wheels, gps], vehicle=CAR, signal_map=load_signal_map(tmp_path / "map.toml"))
     assert not [f for f in again.findings if f.kind == "offset"]

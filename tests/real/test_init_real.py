@@ -43,3 +43,11 @@ def test_a_folder_of_drives_is_sent_to_campaign_init(real_logs, tmp_path):
     assert done.exit_code == 4
     assert "aqualog campaign init FOLDER" in done.stderr
     assert not (tmp_path / "work").exists()
+
+
+def test_the_speed_on_the_bus_is_offered_and_no_checksum(real_logs, tmp_path):
+    folder = real_logs / "toyota_rav4"
+    done = run("init", folder / "can_bus.mf4", "--dbc", folder / "toyota_2017.dbc", "-o", tmp_path / "work")
+    (line,) = (n for n in done.stdout.splitlines() if n.startswith("  no v_x: "))
+    assert "; SPEED [km/h] may be it: map it" in line
+    assert not [w for w in ("CHECKSUM", "LOCKOUT", "SET_", "ENCODER", "UI_") if w in line]

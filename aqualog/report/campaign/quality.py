@@ -18,6 +18,7 @@ from aqualog.report.wording import detector_name
 __all__ = ["MOST_KINDS", "Problem", "problems_of"]
 
 MOST_KINDS = 25  # of notes that have a line of their own
+WHOLE = 2000  # characters: no sentence is so long, only what a damaged file says of itself
 _LANE_SLACK_S = 1.0  # [s] clocks of a lane and of a log
 _NO_VALUE = re.compile(r": no value for (\d+) % of the drive")  # as `missing_notes` has it
 _NUMBER = re.compile(r"(?<![\w.,])[-+−]?\d+(?:[.,]\d+)*|\d+(?:[.,]\d+)*")
@@ -56,7 +57,7 @@ def problems_of(data: CampaignData, keys: Sequence[str]) -> tuple[Problem, ...]:
 
 
 def _problem(runs: Sequence[RunInfo], weight: str, title: str, means: str, test: _Test) -> Problem:
-    hits = tuple((r.index, cut(text, 300)) for r in runs if (text := test(r)))
+    hits = tuple((r.index, cut(text, WHOLE)) for r in runs if (text := test(r)))
     return Problem(weight, title, means, hits)
 
 
@@ -119,7 +120,7 @@ def _without_value(data: CampaignData) -> Problem:
         notes = [(int(m[1]), note) for note in map(str, r.about["notes"]) if (m := _NO_VALUE.search(note))]
         if notes:
             hits.append(
-                (max(n for n, _ in notes), r.index, cut("; ".join(note for _, note in sorted(notes)[::-1]), 300))
+                (max(n for n, _ in notes), r.index, cut("; ".join(note for _, note in sorted(notes)[::-1]), WHOLE))
             )
     hits.sort(key=lambda hit: (-hit[0], hit[1]))
     worst = hits[0][0] if hits else 0
@@ -140,7 +141,7 @@ def _unavailable(data: CampaignData) -> list[Problem]:
     out = []
     for (state, missing, indices), names in alike.items():
         title = f"{', '.join(names)} {'not judged' if state == 'unavailable' else 'judged in part'}"
-        means = cut(f"needs {missing}" if missing else "", 200)
+        means = cut(f"needs {missing}" if missing else "", WHOLE)
         out.append(Problem("limit", title, means, tuple((i, "") for i in indices)))
     return out
 
@@ -170,7 +171,7 @@ def _notes(data: CampaignData) -> list[Problem]:
             found.setdefault(_NUMBER.sub("…", note), []).append((r.index, note))
     kinds = sorted(found.values(), key=lambda hits: -len(hits))
     out = [_note(hits) for hits in kinds[:MOST_KINDS]]
-    rest = [(i, cut(note, 200)) for hits in kinds[MOST_KINDS:] for i, note in hits]
+    rest = [(i, cut(note, WHOLE)) for hits in kinds[MOST_KINDS:] for i, note in hits]
     return [*out, Problem("note", "other notes", "", tuple(sorted(rest)))]
 
 
@@ -199,4 +200,4 @@ def _value(number: str) -> float:
 def _note(hits: Sequence[tuple[int, str]]) -> Problem:
     same = len({note for _, note in hits}) == 1
     title = hits[0][1] if same else _with_ranges([note for _, note in hits])
-    return Problem("note", cut(title, 240), "", tuple((i, "" if same else cut(note, 200)) for i, note in hits))
+    return Problem("note", cut(title, WHOLE), "", tuple((i, "" if same else cut(note, WHOLE)) for i, note in hits))

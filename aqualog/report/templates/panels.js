@@ -47,6 +47,7 @@ function panelBars(plot, rows, act) {
     tools.className = "tools";
     tools.setAttribute("role", "toolbar");
     tools.setAttribute("aria-label", `range of ${row.title}`);
+    fit.className = "fit";
     fit.hidden = true;
     tools.append(fit, ...zooms);
     zooms[0].tabIndex = 0; // one stop of the tab key for each panel; arrows go on to the other buttons
@@ -64,6 +65,7 @@ function panelBars(plot, rows, act) {
       const { t, b } = plot._fullLayout.margin, inner = plot._fullLayout.height - t - b;
       rows.forEach(function (row, k) {
         if (!bars[k]) return;
+        bars[k].node.classList.toggle("narrow", plot.clientWidth < NARROW); // there the title needs the whole line
         if (k === 0) bars[k].node.style.right = plot.clientWidth < NARROW ? "" : "150px"; // beside plotly's own buttons
         bars[k].node.style.top = t + (1 - plot.layout[row.axis].domain[1]) * inner - (k ? 24 : 41) + "px";
       });

@@ -81,6 +81,14 @@ def test_notes_that_differ_in_numbers_are_one_kind(case):
     assert len({i for p in kinds if p.weight == "note" for i, _ in p.runs}) == 500
 
 
+def test_a_long_sentence_is_shown_whole(case):
+    note = "yaw_rate: " + "of a long sentence with an advice at its end " * 12 + "and its last word"
+    done = [replace(r, about={**r.about, "notes": [note if k else f"{note} 1"]}) for k, r in enumerate(case.done)]
+    own = [p for p in problems_of(SimpleNamespace(runs=done, done=done), ("tyre",)) if "yaw_rate" in p.title]
+    assert any(p.title == note for p in own)
+    assert not any("#" in p.title for p in own)
+
+
 def test_a_remark_on_many_logs_keeps_its_numbers(case):
     gains = (0.81, 1.24, 1.1)
     notes = [f"log_{k}.csv: gain {g} (95 % {g - 2} to {g + 0.1:.2f}) at 90 km/h" for k, g in enumerate(gains)]

@@ -285,6 +285,30 @@ def test_a_peak_hides_no_limit_until_it_is_asked_for(show, short):
     assert fit.text == "fit"
 
 
+def test_on_a_narrow_screen_what_is_not_shown_covers_no_title(show, short):
+    track = next(t for t in short.tracks if t.detector == "minor_spin_down" and t.wheel == "fl")
+    track = replace(track, statistic=np.where(np.arange(3000) == 1500, 5000.0, track.statistic))
+    others = tuple(t for t in short.tracks if (t.detector, t.wheel) != ("minor_spin_down", "fl"))
+    browser = show(replace(short, tracks=(*others, track)))
+    covered = """
+        const box = e => e.getBoundingClientRect(), titles = [...document.querySelectorAll("#plots .annotation-text")];
+        const chips = [...document.querySelectorAll(".panel-bar button")].filter(b => b.textContent.startsWith("not shown"));
+        const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+        return [chips.length, titles.length, titles.filter(t => chips.some(c => meet(box(c), box(t)))).length];
+    """
+    try:
+        metrics(browser, 390)
+        main = "return document.querySelector('#plots .main-svg').getBoundingClientRect().right"
+        wait_for(lambda: browser.execute_script(main) <= 390)
+        wait_for(lambda: browser.execute_script("return document.querySelector('.panel-bar.narrow') !== null"))
+        chips, titles, meeting = browser.execute_script(covered)
+        assert chips > 0
+        assert titles > 3
+        assert meeting == 0
+    finally:
+        metrics(browser, 0)
+
+
 def test_the_pointer_tells_the_values_of_all_panels(show, short):
     from selenium.webdriver import ActionChains
     from selenium.webdriver.common.by import By
