@@ -16,7 +16,7 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = [
-    "MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "spectra", "surrogate", "white_noise", "whitened",
+    "MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "good_size", "spectra", "surrogate", "white_noise", "whitened",
 ]  # fmt: skip
 
 # lags of the autoregression, from ... to, as means [samples]
@@ -86,12 +86,12 @@ def spectra(x: FloatArray) -> Spectra:
     """Transforms of arrays (k, C, n), bridged. Their first second replaces the unknown past before the log."""
     n = x.shape[-1]
     past = np.repeat(x[..., :10].mean(axis=-1, keepdims=True), MEMORY, axis=-1)
-    size = _good_size(n + 2 * MEMORY + 1)
+    size = good_size(n + 2 * MEMORY + 1)
     transform = np.fft.rfft(np.concatenate([past, x], axis=-1), size, axis=-1)
     return Spectra(x, transform, size, n)
 
 
-def _good_size(n: int) -> int:
+def good_size(n: int) -> int:
     """Smallest size from n on with small prime factors."""
     best = 1 << (n - 1).bit_length()
     for p5 in (1, 5, 25):
@@ -201,7 +201,7 @@ def _autoregression(z: FloatArray, weights: FloatArray, white: float) -> FloatAr
 def _filtered(z: FloatArray, taps: FloatArray) -> FloatArray:
     n = z.shape[-1]
     past = np.repeat(z[:, :10].mean(axis=1, keepdims=True), MEMORY, axis=1)
-    size = _good_size(n + 2 * MEMORY + 1)
+    size = good_size(n + 2 * MEMORY + 1)
     y = np.fft.irfft(np.fft.rfft(np.concatenate([past, z], axis=1), size) * np.fft.rfft(taps, size), size)
     return y[:, MEMORY : MEMORY + n]
 

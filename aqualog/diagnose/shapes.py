@@ -1,0 +1,98 @@
+"""Unknown forms: the response of a mechanism, times a smooth function of one or two coordinates of the drive.
+
+A force that no effect of the library is, an accelerometer whose gain goes with speed, a slip that grows in a band of
+torque: each is the simulated response to a constant deviation, modulated over the drive. Responses follow within 0.1 s,
+so a modulation needs no further simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.diagnose.spline import Basis, basis
+
+__all__ = ["MECHANISMS", "Mechanism", "Shape", "shapes"]
+
+
+@dataclass(frozen=True, slots=True)
+class Mechanism:
+    """`source`: effect and place whose signature is the response, in `unit`; `usual` size of a deviation, and
+    the one by which a car and its simulation differ anyway.
+
+    `over`: coordinates of its functions, alone or in pairs.
+    """
+
+    name: str
+    title: str
+    source: str
+    unit: str
+    usual: float
+    allowed: float
+    over: tuple[tuple[str, ...], ...]
+
+
+_CAR = (("v_x",), ("torque",), ("a_y",), ("water_depth",), ("ambient_temperature",), ("position",), ("t",),
+        ("v_x", "torque"), ("v_x", "water_depth"))  # fmt: skip
+_SENSOR = (("v_x",), ("a_x",), ("t",), ("ambient_temperature",))
+_SLIP = (("torque",), ("v_x",), ("t",), ("a_y",), ("water_depth",))
+MECHANISMS: tuple[Mechanism, ...] = (
+    Mechanism("force", "a force on the car", "unit_force", "N", 150.0, 15.0, _CAR),
+    Mechanism("accelerometer", "an offset of the accelerometer", "accelerometer_bias@a_x", "m/s^2", 0.15, 0.01, _SENSOR),
+    Mechanism("accelerometer_gain", "the gain of the accelerometer", "accelerometer_gain@a_x", "-", 0.05, 0.01, _SENSOR),
+    Mechanism("torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.01, (("torque",), ("v_x",), ("t",))),
+    Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.07, _SLIP),
+    Mechanism("slip_r", "the slip slope of the rear axle", "slip_stiffness@r", "-", 0.3, 0.07, _SLIP),
+    Mechanism("radius_f", "the radius of the front wheels", "tyre_radius@f", "-", 0.005, 0.0007, (("v_x",), ("t",), ("torque",))),
+    Mechanism("radius_r", "the radius of the rear wheels", "tyre_radius@r", "-", 0.005, 0.0007, (("v_x",), ("t",), ("torque",))),
+    Mechanism("velocity", "the scale of the reference velocity", "velocity_scale@v_x", "-", 0.01, 0.001, (("v_x",), ("t",))),
+    Mechanism("lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.1, (("v_x",), ("t",))),
+    Mechanism("road", "the slope of the road", "road_grade", "rad", 0.015, 0.0, (("position",),)),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A mechanism over coordinates: `basis` (n, K) with the covariance of its coefficients at a usual size of one."""
+
+    mechanism: Mechanism
+    coordinates: tuple[str, ...]
+    basis: Basis
+
+    @property
+    def key(self) -> str:
+        """`force(v_x)`."""
+        return f"{self.mechanism.name}({', '.join(self.coordinates)})"
+
+    @property
+    def along(self) -> bool:
+        """Whether it runs with time or place: no property that another drive would show."""
+        return bool({"t", "position"} & set(self.coordinates))
+
+    def columns(self, response: FloatArray) -> FloatArray:
+        """Residual-shaped columns (K, C, n) of a response (C, n) to a unit."""
+        return np.asarray(self.basis.columns.T[:, None, :] * response[None])
+
+
+def shapes(
+    coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, has: Sequence[str]
+) -> tuple[Shape, ...]:
+    """All shapes that a drive can show; `has`: the sources for which there are responses."""
+    made: dict[tuple[str, tuple[str, ...]], Basis | None] = {}
+    out = []
+    for m in MECHANISMS:
+        if m.source not in has:
+            continue
+        for names in m.over:
+            if not all(n in coordinates for n in names):
+                continue
+            key = ("road" if m.name == "road" else "", names)
+            if key not in made:
+                made[key] = basis(names, [coordinates[n] for n in names], mask, dt, is_road=m.name == "road")
+            found = made[key]
+            if found is not None:
+                out.append(Shape(m, names, found))
+    return tuple(out)

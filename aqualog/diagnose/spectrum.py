@@ -1,0 +1,122 @@
+"""Inner products of residuals under their noise: an autoregression first, the smoothed spectrum of its remainder then.
+
+The autoregression of `noise` handles gaps, outliers and long memory. What it leaves of the colour would inflate some
+directions and not others; whitening by the remainder's own cross spectrum takes that off, so that the gain of any column
+under noise alone follows its chi-squared distribution. Surrogates of the noise are then draws of normal numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.diagnose.noise import Noise, bridged, fit_noise, good_size, spectra, whitened
+
+__all__ = ["Weighing", "weighing"]
+
+BANDWIDTH = 0.3  # of the frequency: share that spectra are averaged over to either side
+NARROWEST, WIDEST = 10, 40  # bins to either side
+SLOPED = 60  # lines whose power may follow a power law
+CHUNK = 48  # columns that are transformed together
+
+Complex = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True, slots=True)
+class Weighing:
+    """Turns residual-shaped arrays (C, n) of one drive into rows whose inner products are twice log-likelihoods.
+
+    `inverse` (F, C, C): roots of the inverse cross spectra of the whitened remainder, `used` (n,) its samples;
+    `surprise`: negative log-likelihood of the residual that it was made from, without a constant.
+    """
+
+    noise: Noise
+    mask: BoolArray
+    used: BoolArray
+    inverse: Complex
+    size: int
+    surprise: float
+
+    @property
+    def width(self) -> int:
+        """Length of a row."""
+        return 2 * self.inverse.shape[0] * self.inverse.shape[1]
+
+    def rows(self, x: FloatArray) -> FloatArray:
+        """Arrays (k, C, n) as rows (k, M)."""
+        out = np.empty((len(x), self.width))
+        for i in range(0, len(x), CHUNK):
+            out[i : i + CHUNK] = self._rows(np.asarray(x[i : i + CHUNK], dtype=np.float64))
+        return out
+
+    def _rows(self, x: FloatArray) -> FloatArray:
+        flat = whitened(spectra(bridged(x, self.mask)), self.noise).reshape(x.shape)
+        lines = np.matmul(self.inverse, _lines(flat[..., self.used], self.size).transpose(2, 1, 0))  # (F, C, k)
+        return np.concatenate([lines.real, lines.imag]).reshape(-1, len(x)).T
+
+
+def weighing(residual: FloatArray, mask: BoolArray, contrasts: FloatArray, noise: Noise | None = None) -> Weighing:
+    """The weighing by the noise of a residual (C, n) from which known effects have been subtracted."""
+    noise = noise or fit_noise(residual, mask, contrasts)
+    e = whitened(spectra(bridged(residual, mask)[None]), noise)[0].reshape(residual.shape)
+    used = (noise.weights > 0.0).any(axis=0)
+    count = int(used.sum())
+    size = good_size(count)
+    raw = np.fft.rfft(e[:, used], size).T / np.sqrt(count)  # (F, C)
+    pilot = _power_law(np.abs(raw[1:]) ** 2)
+    pilot = np.concatenate([pilot[:1], pilot])
+    flat = raw[1:] / pilot[1:]
+    cross = _averaged(flat[:, :, None] * flat[:, None, :].conj())
+    cross = np.concatenate([cross[:1].real.astype(complex), cross])
+    cross += 1e-6 * np.trace(cross, axis1=1, axis2=2).real[:, None, None] * np.eye(raw.shape[1])
+    root = np.linalg.cholesky(cross) * pilot[:, :, None]
+    inverse = np.linalg.inv(root)
+    own = np.einsum("fij,fj->fi", inverse, raw)
+    lines = np.full(len(raw), 2.0)
+    lines[0] = 1.0
+    logdet = 2.0 * np.log(np.abs(np.diagonal(root, axis1=1, axis2=2))).sum(axis=1)
+    share = count / size
+    surprise = 0.5 * share * float(lines @ (logdet + (np.abs(own) ** 2).sum(axis=1)))
+    return Weighing(noise, mask, used, inverse, size, noise.surprise + surprise)
+
+
+def _lines(x: FloatArray, size: int) -> Complex:
+    """Fourier lines (..., F), scaled so that their squares sum to the signal's."""
+    lines = np.fft.rfft(x, size, axis=-1) * np.sqrt(2.0 / size)
+    lines[..., 0] *= np.sqrt(0.5)
+    if size % 2 == 0:
+        lines[..., -1] *= np.sqrt(0.5)
+    return np.asarray(lines)
+
+
+def _power_law(power: FloatArray) -> FloatArray:
+    """Amplitude (F, C) of f^-b at low frequencies, b >= 0, and constant beyond, from periodograms (F, C)."""
+    k = np.arange(1, power.shape[0] + 1, dtype=np.float64)
+    low = slice(0, min(SLOPED, power.shape[0]))
+    x = np.log(k[low])
+    y = np.log(power[low] + 1e-300)
+    slope = (x - x.mean()) @ (y - y.mean(axis=0)) / ((x - x.mean()) @ (x - x.mean()))
+    b = np.clip(-slope, 0.0, 2.0)
+    return np.asarray((SLOPED / np.minimum(k, SLOPED))[:, None] ** (0.5 * b), dtype=np.float64)
+
+
+def _averaged(cross: Complex) -> Complex:
+    """Means over neighbouring frequencies of cross-spectra (F, C, C), reflected at both ends."""
+    count = cross.shape[0]
+    reach = np.clip((BANDWIDTH * np.arange(count)).astype(np.int64), NARROWEST, WIDEST)
+    width = min(WIDEST, count - 1)
+    reach = np.minimum(reach, width)
+    padded = np.concatenate([cross[width:0:-1].conj(), cross, cross[-2 : -width - 2 : -1].conj()])
+    total = np.concatenate([np.zeros((1, *cross.shape[1:])), np.cumsum(padded, axis=0)])
+    at = np.arange(count) + width
+    means: Complex = (total[at + reach + 1] - total[at - reach]) / (2.0 * reach + 1.0)[:, None, None]
+    return means
+
+
+def gram(rows: Iterable[FloatArray]) -> FloatArray:
+    """Inner products of rows, summed over drives."""
+    return np.asarray(sum(r @ r.T for r in rows))
