@@ -1,7 +1,7 @@
 """One competition of known effects, unknown shapes and roads, in one evidence.
 
-Everything that may be in a residual is a block of columns with a Gaussian prior of physical size. Beside a set of blocks
-the log of the marginal likelihood that one more block gains is
+Everything that may be in a residual is a block of columns with a Gaussian prior of physical size. Beside a set of
+blocks the log of the marginal likelihood that one more block gains is
 
     -1/2 log |I + P A| + 1/2 b' (P^-1 + A)^-1 b,    A = X'X, b = X'y, both beside the set
 
@@ -11,36 +11,34 @@ so that a shape of twelve columns pays for its freedom and a known effect wins w
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from aqualog.core.records import FloatArray
 
-__all__ = ["SCALES", "Block", "Found", "State", "enumerate_sets", "start"]
+__all__ = ["SCALES", "Block", "State", "added", "scored", "start", "values"]
 
 SCALES = (1.0, 3.0)  # of the usual size: half of all deviations are three times as usual ones (K)
-SINGULAR = 1e-3  # share of a column's energy that a set must leave
 
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """What may be in a residual: `columns` of the Gram matrix, their `prior` covariance, and the log of how usual it is.
+    """What may be in a residual: `columns` of the Gram matrix, their `prior` covariance, log of how usual it is.
 
     `tag`: what it stands for, a hypothesis or a shape; `low` and `high` bounds of the columns' values.
     """
 
     key: str
-    kind: Literal["effect", "shape", "road", "interval"]
+    kind: Literal["effect", "shape", "road"]
     columns: tuple[int, ...]
     prior: FloatArray
     log_prior: float
     tag: int
     low: FloatArray | None = None
     high: FloatArray | None = None
-    mix: FloatArray | None = None  # (k, d): columns to coordinates of the block
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +57,7 @@ def start(inner: FloatArray) -> State:
 
 def _parts(state: State, block: Block) -> tuple[FloatArray, FloatArray]:
     c = list(block.columns)
-    A, b = state.inner[np.ix_(c, c)], state.inner[c, -1]
-    if block.mix is not None:
-        A, b = block.mix.T @ A @ block.mix, block.mix.T @ b
-    return A, b
+    return state.inner[np.ix_(c, c)], state.inner[c, -1]
 
 
 def _evidence(A: FloatArray, b: FloatArray, P: FloatArray) -> tuple[float, FloatArray]:
@@ -88,21 +83,12 @@ def scored(state: State, block: Block) -> tuple[float, float]:
     return total, SCALES[each.index(top)]
 
 
-def value(state: State, block: Block, scale: float) -> FloatArray:
-    """Posterior mean of a block's columns beside a set."""
-    A, b = _parts(state, block)
-    mean = _evidence(A, b, scale * scale * block.prior)[1]
-    return mean if block.mix is None else np.asarray(block.mix @ mean)
-
-
 def added(state: State, index: int, block: Block) -> State:
     """The state with one block more."""
     gained, scale = scored(state, block)
     c = list(block.columns)
     B = state.inner[:, c]
     A = state.inner[np.ix_(c, c)]
-    if block.mix is not None:
-        B, A = B @ block.mix, block.mix.T @ A @ block.mix
     L = scale * np.linalg.cholesky(block.prior)
     BL = B @ L
     M = np.eye(L.shape[1]) + L.T @ A @ L
@@ -110,15 +96,16 @@ def added(state: State, index: int, block: Block) -> State:
     return State(inner, (*state.members, index), state.evidence + gained + block.log_prior)
 
 
-def values(inner: FloatArray, blocks: Sequence[Block], scales: Sequence[float]) -> tuple[list[int], FloatArray, FloatArray]:
+def values(
+    inner: FloatArray, blocks: Sequence[Block], scales: Sequence[float]
+) -> tuple[list[int], FloatArray, FloatArray]:
     """Posterior means and covariance of all columns of a set together: columns, mean, covariance."""
     columns = [c for b in blocks for c in b.columns]
     k = len(columns)
     P = np.zeros((k, k))
     at = 0
     for b, s in zip(blocks, scales, strict=True):
-        own = b.prior if b.mix is None else b.mix @ b.prior @ b.mix.T + 1e-12 * np.eye(len(b.columns))
-        P[at : at + len(b.columns), at : at + len(b.columns)] = s * s * own
+        P[at : at + len(b.columns), at : at + len(b.columns)] = s * s * b.prior
         at += len(b.columns)
     G, y = inner[np.ix_(columns, columns)], inner[columns, -1]
     cov = np.linalg.inv(np.linalg.inv(P) + G)

@@ -157,7 +157,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(logged, vehicle, dt) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
     return Drive(
-        name, dt, vehicle, course, speed, filled, channels, mask, _coordinates(filled, course, v, dt), present,
+        name, dt, vehicle, course, speed, filled, channels, mask, _coordinates(filled, course, speed, v, dt), present,
         not torqued, n * dt, tuple(notes),
     )  # fmt: skip
 
@@ -293,10 +293,13 @@ def _widened(bad: BoolArray, by: float, dt: float) -> BoolArray:
     return np.convolve(bad.astype(np.float64), np.ones(2 * k + 1), "same") > 0.5
 
 
-def _coordinates(columns: Mapping[str, FloatArray], course: Course, v: FloatArray, dt: float) -> dict[str, FloatArray]:
+def _coordinates(
+    columns: Mapping[str, FloatArray], course: Course, speed: FloatArray, v: FloatArray, dt: float
+) -> dict[str, FloatArray]:
+    """Coordinates without the noise of the channels: a function of a noisy one would correlate with its noise."""
     out = {
         "t": course.t,
-        "v_x": v,
+        "v_x": speed,
         "torque": course.torque.sum(axis=0),
         "position": np.cumsum(v) * dt,
         # without smoothing, most of the change would be noise of the velocity
@@ -307,6 +310,8 @@ def _coordinates(columns: Mapping[str, FloatArray], course: Course, v: FloatArra
         for lane in course.lanes:
             depth[(course.t >= lane.start) & (course.t < lane.end)] = 0.5 * (lane.depth_left + lane.depth_right)
         out["water_depth"] = depth
+    if "yaw_rate" in columns:
+        out["a_y"] = speed * columns["yaw_rate"]
     if "ambient_temperature" in columns:
         out["ambient_temperature"] = columns["ambient_temperature"]
     return {n: block_means(x, dt) for n, x in out.items()}

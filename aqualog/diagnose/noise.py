@@ -16,7 +16,8 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = [
-    "MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "good_size", "spectra", "surrogate", "white_noise", "whitened",
+    "MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "good_size", "spectra", "surrogate",
+    "white_noise", "whitened",
 ]  # fmt: skip
 
 # lags of the autoregression, from ... to, as means [samples]

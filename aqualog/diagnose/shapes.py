@@ -41,15 +41,36 @@ _SENSOR = (("v_x",), ("a_x",), ("t",), ("ambient_temperature",))
 _SLIP = (("torque",), ("v_x",), ("t",), ("a_y",), ("water_depth",))
 MECHANISMS: tuple[Mechanism, ...] = (
     Mechanism("force", "a force on the car", "unit_force", "N", 150.0, 15.0, _CAR),
-    Mechanism("accelerometer", "an offset of the accelerometer", "accelerometer_bias@a_x", "m/s^2", 0.15, 0.01, _SENSOR),
-    Mechanism("accelerometer_gain", "the gain of the accelerometer", "accelerometer_gain@a_x", "-", 0.05, 0.01, _SENSOR),
-    Mechanism("torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.01, (("torque",), ("v_x",), ("t",))),
+    Mechanism(
+        "accelerometer", "an offset of the accelerometer", "accelerometer_bias@a_x", "m/s^2", 0.15, 0.01,
+        _SENSOR,
+    ),
+    Mechanism(
+        "accelerometer_gain", "the gain of the accelerometer", "accelerometer_gain@a_x", "-", 0.05, 0.01,
+        _SENSOR,
+    ),
+    Mechanism(
+        "torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.01,
+        (("torque",), ("v_x",), ("t",)),
+    ),
     Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.07, _SLIP),
     Mechanism("slip_r", "the slip slope of the rear axle", "slip_stiffness@r", "-", 0.3, 0.07, _SLIP),
-    Mechanism("radius_f", "the radius of the front wheels", "tyre_radius@f", "-", 0.005, 0.0007, (("v_x",), ("t",), ("torque",))),
-    Mechanism("radius_r", "the radius of the rear wheels", "tyre_radius@r", "-", 0.005, 0.0007, (("v_x",), ("t",), ("torque",))),
-    Mechanism("velocity", "the scale of the reference velocity", "velocity_scale@v_x", "-", 0.01, 0.001, (("v_x",), ("t",))),
-    Mechanism("lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.1, (("v_x",), ("t",))),
+    Mechanism(
+        "radius_f", "the radius of the front wheels", "tyre_radius@f", "-", 0.005, 0.0007,
+        (("v_x",), ("t",), ("torque",)),
+    ),
+    Mechanism(
+        "radius_r", "the radius of the rear wheels", "tyre_radius@r", "-", 0.005, 0.0007,
+        (("v_x",), ("t",), ("torque",)),
+    ),
+    Mechanism(
+        "velocity", "the scale of the reference velocity", "velocity_scale@v_x", "-", 0.01, 0.001,
+        (("v_x",), ("t",)),
+    ),
+    Mechanism(
+        "lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.1,
+        (("v_x",), ("t",)),
+    ),
     Mechanism("road", "the slope of the road", "road_grade", "rad", 0.015, 0.0, (("position",),)),
 )  # fmt: skip
 
@@ -77,9 +98,7 @@ class Shape:
         return np.asarray(self.basis.columns.T[:, None, :] * response[None])
 
 
-def shapes(
-    coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, has: Sequence[str]
-) -> tuple[Shape, ...]:
+def shapes(coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, has: Sequence[str]) -> tuple[Shape, ...]:
     """All shapes that a drive can show; `has`: the sources for which there are responses."""
     made: dict[tuple[str, tuple[str, ...]], Basis | None] = {}
     out = []

@@ -1,8 +1,8 @@
 """Inner products of residuals under their noise: an autoregression first, the smoothed spectrum of its remainder then.
 
 The autoregression of `noise` handles gaps, outliers and long memory. What it leaves of the colour would inflate some
-directions and not others; whitening by the remainder's own cross spectrum takes that off, so that the gain of any column
-under noise alone follows its chi-squared distribution. Surrogates of the noise are then draws of normal numbers.
+directions and not others; whitening by the remainder's own cross spectrum takes that off, so that the gain of any
+column under noise alone follows its chi-squared distribution. Surrogates of the noise are then draws of normal numbers.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Weighing:
     @property
     def width(self) -> int:
         """Length of a row."""
-        return 2 * self.inverse.shape[0] * self.inverse.shape[1]
+        return int(2 * self.inverse.shape[0] * self.inverse.shape[1])
 
     def rows(self, x: FloatArray) -> FloatArray:
         """Arrays (k, C, n) as rows (k, M)."""
@@ -63,7 +63,7 @@ def weighing(residual: FloatArray, mask: BoolArray, contrasts: FloatArray, noise
     """The weighing by the noise of a residual (C, n) from which known effects have been subtracted."""
     noise = noise or fit_noise(residual, mask, contrasts)
     e = whitened(spectra(bridged(residual, mask)[None]), noise)[0].reshape(residual.shape)
-    used = (noise.weights > 0.0).any(axis=0)
+    used = np.asarray((noise.weights > 0.0).any(axis=0))
     count = int(used.sum())
     size = good_size(count)
     raw = np.fft.rfft(e[:, used], size).T / np.sqrt(count)  # (F, C)
@@ -74,7 +74,7 @@ def weighing(residual: FloatArray, mask: BoolArray, contrasts: FloatArray, noise
     cross = np.concatenate([cross[:1].real.astype(complex), cross])
     cross += 1e-6 * np.trace(cross, axis1=1, axis2=2).real[:, None, None] * np.eye(raw.shape[1])
     root = np.linalg.cholesky(cross) * pilot[:, :, None]
-    inverse = np.linalg.inv(root)
+    inverse = np.linalg.inv(root).astype(np.complex128)
     own = np.einsum("fij,fj->fi", inverse, raw)
     lines = np.full(len(raw), 2.0)
     lines[0] = 1.0

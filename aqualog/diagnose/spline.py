@@ -1,4 +1,4 @@
-"""Smooth functions of one or two coordinates of a drive: splines with a Gaussian-process prior on their coefficients."""
+"""Smooth functions of one or two coordinates of a drive: splines whose coefficients have a Gaussian-process prior."""
 
 from __future__ import annotations
 

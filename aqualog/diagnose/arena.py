@@ -1,0 +1,244 @@
+"""What competes for the residuals of some drives: known effects and unknown shapes as blocks of columns."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.diagnose.channels import block_step, contrasts
+from aqualog.diagnose.competition import Block
+from aqualog.diagnose.drive import Drive
+from aqualog.diagnose.evidence import Evidence
+from aqualog.diagnose.hypotheses import residual
+from aqualog.diagnose.noise import white_noise
+from aqualog.diagnose.shapes import Shape, shapes
+from aqualog.diagnose.spectrum import Weighing, weighing
+from aqualog.model.effects import EMPIRICAL
+from aqualog.model.term import Model, Term
+
+__all__ = ["Arena", "Part", "make_arena", "unit_force"]
+
+KNOWN_PRIOR, SHAPE_PRIOR = 0.03, 0.01  # of an effect at any place, and of a shape of a mechanism, on one drive (K)
+MOST_BLOCKS = 12000  # of 0.1 s that compete; a longer drive does with its best 20 min
+FORCE_N = 100.0  # of the force whose response stands for any force
+TOLERATED = ("v_x", "torque", "a_y", "a_x")  # coordinates along which a car and its simulation differ anyway
+CHUNK = 4096  # entries of rows that are multiplied together
+ALONG = ("t", "position")
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A stretch `at` of one drive: residual (C, n), mask (n,), `responses` (C, n) by source, `signatures` (k, C, n)."""
+
+    at: slice
+    residual: FloatArray
+    mask: BoolArray
+    channels: tuple[str, ...]
+    signatures: FloatArray
+    responses: dict[str, FloatArray]
+
+
+@dataclass(frozen=True, slots=True)
+class Arena:
+    """Blocks of columns. `sd` (K,) prior size of each column, by which it is scaled; `tolerance` (K, K) scaled
+    covariance of what cars and files differ by anyway; `rows` per part: where its samples are in the shapes' bases.
+    """
+
+    evidence: Evidence
+    parts: tuple[Part, ...]
+    rows: tuple[slice, ...]
+    shapes: tuple[Shape, ...]
+    blocks: tuple[Block, ...]
+    sd: FloatArray
+    tolerance: FloatArray
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+        return self.sd.size
+
+    def name(self, block: int) -> str:
+        """Name by which probabilities add up: the effect, or the mechanism of a shape."""
+        b = self.blocks[block]
+        if b.kind == "effect":
+            return self.evidence.asked[b.tag].effect.name
+        return self.shapes[b.tag].mechanism.name
+
+    def drawn(self, part: int, block: Block) -> FloatArray:
+        """Scaled columns (k, C, n) of a block along a part."""
+        p, c = self.parts[part], list(block.columns)
+        if block.kind == "effect":
+            return p.signatures[c] * self.sd[c, None, None]
+        s = self.shapes[block.tag]
+        modulation = s.basis.columns[self.rows[part]].T * self.sd[c, None]
+        return np.asarray(modulation[:, None, :] * p.responses[s.mechanism.source][None])
+
+    def inner(self, weighings: Sequence[Weighing]) -> FloatArray:
+        """Inner products (K + 1, K + 1) of all columns, the residual last, summed over the parts."""
+        total = np.zeros((self.width + 1, self.width + 1))
+        known = self.evidence.count
+        for i, (p, w) in enumerate(zip(self.parts, weighings, strict=True)):
+            rows = np.empty((self.width + 1, w.width), dtype=np.float32)
+            rows[:known] = w.rows(p.signatures * self.sd[:known, None, None])
+            for b in self.blocks:
+                if b.kind != "effect":
+                    rows[list(b.columns)] = w.rows(self.drawn(i, b))
+            rows[-1] = w.rows(p.residual[None])[0]
+            total += _products(rows)
+        return total
+
+    def white(self) -> FloatArray:
+        """The same under white noise of the size of the residuals' steps."""
+        total = np.zeros((self.width + 1, self.width + 1))
+        known = self.evidence.count
+        for i, p in enumerate(self.parts):
+            noise = white_noise(p.residual, p.mask, contrasts(p.channels))
+            used = np.asarray((noise.weights > 0.0).any(axis=0))
+            rows = np.empty((self.width + 1, p.residual.shape[0] * int(used.sum())), dtype=np.float32)
+
+            def white(x: FloatArray, rotation: FloatArray = noise.rotation, used: BoolArray = used) -> FloatArray:
+                return np.asarray(np.matmul(rotation, x)[..., used].reshape(len(x), -1))
+
+            rows[:known] = white(p.signatures * self.sd[:known, None, None])
+            for b in self.blocks:
+                if b.kind != "effect":
+                    rows[list(b.columns)] = white(self.drawn(i, b))
+            rows[-1] = white(p.residual[None])[0]
+            total += _products(rows)
+        return total
+
+    def tolerant(self, gram: FloatArray) -> FloatArray:
+        """Inner products that forgive the tolerances, by Woodbury's identity [woodbury1950]."""
+        k = np.flatnonzero((np.diag(self.tolerance) > 0.0) & (np.diag(gram)[:-1] > 1e-12))
+        P = self.tolerance[np.ix_(k, k)]
+        root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
+        B = gram[:, k] @ root
+        return np.asarray(gram - B @ np.linalg.solve(np.eye(k.size) + root.T @ gram[np.ix_(k, k)] @ root, B.T))
+
+    def weighed(self, residuals: Sequence[FloatArray]) -> tuple[Weighing, ...]:
+        """The weighing of each part by the noise of a residual of it."""
+        return tuple(weighing(r, p.mask, contrasts(p.channels)) for r, p in zip(residuals, self.parts, strict=True))
+
+
+def unit_force(drive: Drive, model: Model, base: FloatArray) -> FloatArray:
+    """Change (C, n) of a drive's residual by 1 N against the motion; `base`: the residual under the model."""
+    effect = EMPIRICAL["unexplained_force"]
+    knots: tuple[tuple[float, float], ...] = ((0.0, FORCE_N), (150.0, FORCE_N))
+    known = next((t for t in model.terms if t.effect is effect), None)
+    if known is not None:
+        knots = tuple((x, y + FORCE_N) for x, y in known.knots)
+    term = Term(effect, knots=knots)
+    others = tuple(t for t in model.terms if t is not known)
+    return np.asarray((base - residual(drive, Model((*others, term)))) / FORCE_N)
+
+
+def make_arena(evidence: Evidence, model: Model) -> Arena:
+    """All effects of the evidence that are not tolerances, and all shapes that the drives can show.
+
+    Shapes of time and place take part on a single drive only: another drive has other ones.
+    """
+    forces = []
+    for d, r in zip(evidence.drives, evidence.residuals, strict=True):
+        try:
+            forces.append(unit_force(d, model, r))
+        except ConfigError:
+            forces = []
+            break
+    return arena_of(evidence, forces)
+
+
+def arena_of(evidence: Evidence, forces: Sequence[FloatArray]) -> Arena:
+    """The arena with the responses to a unit force at hand, one per drive; without any, no shape of a force."""
+    chosen = _stretches(evidence.drives)
+    parts, coordinates = [], []
+    for d, at in chosen:
+        drive, signatures = evidence.drives[d], evidence.signatures[d][..., at]
+        responses = {
+            h.key: signatures[c[0]] for h, c in zip(evidence.asked, evidence.columns, strict=True) if len(c) == 1
+        }
+        if forces:
+            responses["unit_force"] = forces[d][:, at]
+        mask = drive.mask[at]
+        parts.append(Part(at, evidence.residuals[d][:, at], mask, drive.channels, signatures, responses))
+        coordinates.append({n: x[at] for n, x in drive.coordinates.items()})
+    names = [n for n in coordinates[0] if all(n in c for c in coordinates) and (len(parts) == 1 or n not in ALONG)]
+    joint = {n: np.concatenate([c[n] for c in coordinates]) for n in names}
+    mask = np.concatenate([p.mask for p in parts])
+    made = shapes(joint, mask, block_step(evidence.drives[chosen[0][0]].dt), list(parts[0].responses))
+    ends = np.cumsum([0, *(p.mask.size for p in parts)])
+    rows = tuple(slice(a, b) for a, b in pairwise(ends.tolist()))
+    blocks, sd = _blocks(evidence, made)
+    return Arena(evidence, tuple(parts), rows, made, blocks, sd, _tolerance(evidence, made, blocks, sd))
+
+
+def _stretches(drives: Sequence[Drive]) -> list[tuple[int, slice]]:
+    """The longest drives first, up to the most that compete; of one that is longer, its best stretch."""
+    out: list[tuple[int, slice]] = []
+    left = MOST_BLOCKS
+    for d in sorted(range(len(drives)), key=lambda i: -drives[i].used_s):
+        mask = drives[d].mask
+        if mask.size <= left:
+            out.append((d, slice(0, mask.size)))
+            left -= mask.size
+        elif not out:
+            total = np.concatenate([[0], np.cumsum(mask)])
+            start = int(np.argmax(total[left:] - total[:-left]))
+            return [(d, slice(start, start + left))]
+    return out
+
+
+def _blocks(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, ...], FloatArray]:
+    places = Counter(h.effect.name for h in evidence.asked)
+    each = Counter(s.mechanism.name for s in made)
+    sd = [evidence.prior]
+    out = []
+    for i, (h, columns) in enumerate(zip(evidence.asked, evidence.columns, strict=True)):
+        if h.allowed or evidence.barred[i]:
+            continue
+        c = list(columns)
+        out.append(
+            Block(
+                h.key, "effect", columns, np.eye(len(c)), math.log(KNOWN_PRIOR / places[h.effect.name]), i,
+                evidence.low[c] / evidence.prior[c], evidence.high[c] / evidence.prior[c],
+            )
+        )  # fmt: skip
+    n = evidence.count
+    for j, s in enumerate(made):
+        k = s.basis.columns.shape[1]
+        kind = "road" if s.mechanism.name == "road" else "shape"
+        own = tuple(range(n, n + k))
+        out.append(Block(s.key, kind, own, s.basis.prior, math.log(SHAPE_PRIOR / each[s.mechanism.name]), j))  # type: ignore[arg-type]
+        sd.append(np.full(k, s.mechanism.usual))
+        n += k
+    return tuple(out), np.concatenate(sd)
+
+
+def _tolerance(evidence: Evidence, made: Sequence[Shape], blocks: Sequence[Block], sd: FloatArray) -> FloatArray:
+    out = np.zeros((sd.size, sd.size))
+    k = np.arange(evidence.count)
+    out[k, k] = (evidence.forgiven / evidence.prior) ** 2
+    for b in blocks:
+        if b.kind != "shape":
+            continue
+        s = made[b.tag]
+        if len(s.coordinates) == 1 and s.coordinates[0] in TOLERATED and s.mechanism.allowed > 0.0:
+            c = list(b.columns)
+            out[np.ix_(c, c)] = (s.mechanism.allowed / s.mechanism.usual) ** 2 * s.basis.prior
+    return out
+
+
+def _products(rows: npt.NDArray[np.float32]) -> FloatArray:
+    """Inner products of single-precision rows, in double precision."""
+    total = np.zeros((len(rows), len(rows)))
+    for i in range(0, rows.shape[1], CHUNK):
+        x = rows[:, i : i + CHUNK].astype(np.float64)
+        total += x @ x.T
+    return total

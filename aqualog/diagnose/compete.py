@@ -1,0 +1,210 @@
+"""The competition on the residuals of some drives: a posterior over sets of effects and shapes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.core.records import FloatArray
+from aqualog.diagnose.arena import Arena
+from aqualog.diagnose.competition import Block, State, added, scored, start, values
+from aqualog.diagnose.spectrum import Weighing
+from aqualog.diagnose.subsets import SINGULAR, TWINS, compatible
+
+__all__ = ["Fitted", "Posterior", "compete", "fitted"]
+
+WIDTH = 8  # sets that are carried on
+MOST = 4  # blocks in one set
+SWAPPED = 3  # sets in which every member is exchanged
+FEW = 4  # first candidates in each metric after which the noise is tried
+ROUNDS = 3  # of noise after the best set
+DIES = 6.0  # [nats] behind the best set, at which a level of larger sets ends the search
+OPTIMISM = 1.5  # [nats] by which noise after a fit with one column is too likely
+SMALLEST = 1e-12
+
+Members = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Posterior:
+    """`sets` by evidence with their prior, best first, and `probability` of each; `gram` plain and `tolerant`."""
+
+    sets: tuple[tuple[Members, float], ...]
+    probability: FloatArray
+    marginal: Mapping[str, float]  # by name of effect or mechanism
+    blocks: Mapping[int, float]  # by block
+    gram: FloatArray
+    tolerant: FloatArray
+    weighings: tuple[Weighing, ...]
+
+    @property
+    def best(self) -> Members:
+        """The most probable set."""
+        return self.sets[0][0]
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A set's `columns`, posterior `mean` (k,) and `covariance` (k, k) in scaled values."""
+
+    columns: list[int]
+    mean: FloatArray
+    covariance: FloatArray
+
+
+def fitted(arena: Arena, tolerant: FloatArray, members: Sequence[int]) -> Fitted:
+    """Values of all columns of a set together."""
+    state = start(tolerant)
+    scales = []
+    for m in members:
+        scales.append(scored(state, arena.blocks[m])[1])
+        state = added(state, m, arena.blocks[m])
+    return Fitted(*values(tolerant, [arena.blocks[m] for m in members], scales))
+
+
+def compete(arena: Arena) -> Posterior:
+    """The posterior over the sets that a search with swaps visits.
+
+    The noise is that under which the measurement is most likely, after no block or after one of the first candidates
+    in the metrics of coloured and of white noise. It is estimated again after the best set.
+    """
+    plain = [p.residual for p in arena.parts]
+    weighings = arena.weighed(plain)
+    least = _surprise(weighings)
+    after: Members = ()
+    gram = arena.inner(weighings)
+    tolerant = arena.tolerant(gram)
+    first = weighings
+    for metric in (tolerant, arena.tolerant(arena.white())):
+        for m in _first(arena, metric):
+            again = arena.weighed(_left(arena, metric, (m,)))
+            price = OPTIMISM * len(arena.blocks[m].columns)
+            if _surprise(again) + price < least:
+                least, weighings, after = _surprise(again) + price, again, (m,)
+    for _ in range(ROUNDS):
+        if weighings is not first:
+            gram = arena.inner(weighings)
+            tolerant = arena.tolerant(gram)
+        sets = _searched(arena, gram, tolerant)
+        best = max(sets, key=lambda k: sets[k])
+        if not best or set(best) == set(after):
+            break
+        again = arena.weighed(_left(arena, tolerant, best))
+        if _surprise(again) >= _surprise(weighings) - 1.0:
+            break
+        weighings, after = again, best
+    return _posterior(arena, sets, gram, tolerant, weighings)
+
+
+def _posterior(
+    arena: Arena, sets: Mapping[Members, float], gram: FloatArray, tolerant: FloatArray, weighings: Sequence[Weighing]
+) -> Posterior:
+    ranked = tuple(sorted(sets.items(), key=lambda x: -x[1]))
+    z = np.array([e for _, e in ranked])
+    p = np.exp(z - z.max())
+    p /= p.sum()
+    by_name: dict[str, float] = {}
+    by_block: dict[int, float] = {}
+    for (members, _), q in zip(ranked, p.tolist(), strict=True):
+        for name in {arena.name(m) for m in members}:
+            by_name[name] = by_name.get(name, 0.0) + q
+        for m in members:
+            by_block[m] = by_block.get(m, 0.0) + q
+    return Posterior(ranked, p, by_name, by_block, gram, tolerant, tuple(weighings))
+
+
+def _surprise(weighings: Sequence[Weighing]) -> float:
+    return sum(w.surprise for w in weighings)
+
+
+def _first(arena: Arena, metric: FloatArray) -> list[int]:
+    """The few blocks that gain most alone."""
+    state = start(metric)
+    gains = [
+        (scored(state, b)[0] + b.log_prior, i) for i, b in enumerate(arena.blocks) if _shows(arena, state, b, metric)
+    ]
+    return [i for gain, i in sorted(gains, reverse=True)[:FEW] if gain > 0.0]
+
+
+def _left(arena: Arena, metric: FloatArray, members: Members) -> list[FloatArray]:
+    """The residual of each part without what a set explains."""
+    fit = fitted(arena, metric, members)
+    out = []
+    for i, p in enumerate(arena.parts):
+        columns = np.concatenate([arena.drawn(i, arena.blocks[m]) for m in members])
+        out.append(p.residual - np.tensordot(fit.mean, columns, axes=1))
+    return out
+
+
+def _searched(arena: Arena, gram: FloatArray, tolerant: FloatArray) -> dict[Members, float]:
+    """Evidence of the sets that are visited: the best ones of each size carried on, then members exchanged."""
+    states = [start(tolerant)]
+    sets: dict[Members, float] = {(): 0.0}
+    for _ in range(MOST):
+        new: dict[Members, tuple[float, State, int]] = {}
+        for state in states:
+            for i, gain in _joining(arena, gram, tolerant, state):
+                key = tuple(sorted((*state.members, i)))
+                total = state.evidence + gain
+                if key not in new or new[key][0] < total:
+                    new[key] = (total, state, i)
+        for key, (total, _, _) in new.items():
+            sets.setdefault(key, total)
+        top = sorted(new.values(), key=lambda x: -x[0])[:WIDTH]
+        if not top or top[0][0] < max(sets.values()) - DIES:
+            break
+        states = [added(state, i, arena.blocks[i]) for _, state, i in top]
+    for members in sorted(sets, key=lambda k: -sets[k])[:SWAPPED]:
+        for out in members if len(members) > 1 else ():
+            state = start(tolerant)
+            for m in members:
+                if m != out:
+                    state = added(state, m, arena.blocks[m])
+            for i, gain in _joining(arena, gram, tolerant, state):
+                key = tuple(sorted((*state.members, i)))
+                sets[key] = max(sets.get(key, -math.inf), state.evidence + gain)
+    return sets
+
+
+def _joining(arena: Arena, gram: FloatArray, tolerant: FloatArray, state: State) -> list[tuple[int, float]]:
+    """Blocks that may join a set, with what each gains."""
+    return [
+        (i, scored(state, b)[0] + b.log_prior)
+        for i, b in enumerate(arena.blocks)
+        if i not in state.members and _may_join(arena, gram, state, b) and _shows(arena, state, b, tolerant)
+    ]
+
+
+def _may_join(arena: Arena, gram: FloatArray, state: State, block: Block) -> bool:
+    if block.kind != "effect":
+        return True
+    asked = arena.evidence.asked
+    own = asked[block.tag].effect
+    known = [arena.blocks[m] for m in state.members if arena.blocks[m].kind == "effect"]
+    if any(asked[o.tag].effect is own for o in known) and not compatible(
+        arena.evidence, (*(o.tag for o in known), block.tag)
+    ):
+        return False
+    for o in known:
+        other = asked[o.tag].effect
+        if other.name in own.twins or own.name in other.twins:
+            c, e = block.columns[0], o.columns[0]
+            if 1.0 - gram[c, e] ** 2 / max(gram[c, c] * gram[e, e], 1e-30) < TWINS:
+                return False
+    return True
+
+
+def _shows(arena: Arena, state: State, block: Block, tolerant: FloatArray) -> bool:
+    """Whether a set leaves enough of a single column, and its value is within its bounds."""
+    if len(block.columns) > 1:
+        return True
+    c, A = block.columns[0], state.inner
+    if A[c, c] < max(SINGULAR * tolerant[c, c], SMALLEST):
+        return False
+    if block.low is None or block.high is None:
+        return True
+    value = A[c, -1] / A[c, c]
+    return bool(block.low[0] <= value <= block.high[0])
