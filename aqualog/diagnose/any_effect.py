@@ -1,12 +1,10 @@
-"""Family-wise test for any effect: the largest gain over all hypotheses, compared with simulated noise of the same
+"""Family-wise test for any effect: the largest gain over all hypotheses, compared with draws of noise of the same
 spectrum."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from collections.abc import Sequence
 from statistics import NormalDist
 from typing import NamedTuple
 
@@ -15,14 +13,15 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.evidence import Evidence, gram_of, noises_after, tolerant
-from aqualog.diagnose.hypotheses import THREADS
-from aqualog.diagnose.noise import Noise, surrogate, white_noise
+from aqualog.diagnose.noise import Noise, white_noise, whitened
+from aqualog.diagnose.spectrum import weighing
 from aqualog.diagnose.subsets import fit_set, gains_on_top
 
 __all__ = ["Calibration", "bonferroni", "calibrate", "chance", "gumbel_p", "largest"]
 
+OPTIMISM = 1.5  # [nats] a column by which noise after a fit is too likely
 FEW = 2  # hypotheses after which the noise is tried
-ALIKE = 0.97  # cosine of whitened signatures from which one stands for both in the simulated noise
+ALIKE = 0.97  # cosine of whitened signatures from which one stands for both in the draws
 EULER = 0.5772156649015329
 PLAIN_INFLATION = 1.3  # inflation of the gains without surrogates, as found with simulated noise (D)
 
@@ -60,7 +59,7 @@ def largest(evidence: Evidence, residuals: Sequence[FloatArray], base: Sequence[
             if fit is None:
                 continue
             tried = noises_after(evidence, residuals, dict(zip(fit.columns, fit.theta.tolist(), strict=True)))
-            surprise = sum(n.surprise for n in tried)
+            surprise = sum(n.surprise for n in tried) + OPTIMISM * len(fit.columns)
             if surprise < best[0]:
                 best = (surprise, tried)
     gram = tolerant(evidence, gram_of(evidence, best[1], residuals))
@@ -90,21 +89,25 @@ def calibrate(
     surrogates: int,
     level: float,
     seed: int,
-    tick: Callable[[], None] = lambda: None,
 ) -> Calibration:
     """Null distribution of the largest gain.
+
+    Noise alone makes the columns' inner products with the residual Gaussian. Their covariance follows from the columns
+    and from the smoothed cross spectrum of what the autoregression leaves of the noise. So a surrogate is one draw of
+    normal numbers, as many as there are columns.
 
     Parameters
     ----------
     evidence : Evidence
     quiet : sequence of array (C, n)
-        Residuals after the best set: their smoothed spectra make the surrogates [theiler1992].
+        Residuals after the best set: their noise is that of the draws.
     gram : array (K + 1, K + 1)
         Shows which hypotheses are alike, so that one test covers them.
     base : sequence of int
         Hypotheses that are accepted already; noise is tested beside them.
     surrogates : int
-        0: no surrogates; the gains are assumed to be inflated by 1.3, and Bonferroni's bound [bonferroni1936] applies.
+        Number of draws. 0: the gains are assumed to be inflated by 1.3, and Bonferroni's bound [bonferroni1936]
+        applies.
     level : float
         Share of logs without effect that may be reported as having one.
     seed : int
@@ -113,32 +116,39 @@ def calibrate(
     sizes = np.array([len(c) for c in evidence.columns], dtype=np.float64)
     groups = _groups(evidence, gram)
     leaders = sorted({g for g in groups.tolist() if not evidence.asked[g].allowed})
-    allowed = [i for i, h in enumerate(evidence.asked) if h.allowed]
     if surrogates == 0:
         return Calibration(
             np.full(H, PLAIN_INFLATION), np.zeros(0), bonferroni(level, len(leaders)), level, len(leaders)
         )
-    wanted = sorted({*leaders, *base, *allowed})
-    small = _restricted(evidence, wanted)
-    at = {m: i for i, m in enumerate(wanted)}
-
-    def one(s: int) -> FloatArray:
-        rng = np.random.default_rng(np.random.SeedSequence([seed, s]))
-        noise_only = [surrogate(r, d.mask, rng) for r, d in zip(quiet, evidence.drives, strict=True)]
-        gains, _ = largest(small, noise_only, [at[m] for m in base])
-        tick()
-        return gains
-
-    with ThreadPoolExecutor(THREADS) as pool:
-        drawn = np.array(list(pool.map(one, range(surrogates))))
-    mean = np.ones(H)
-    for i, m in enumerate(wanted):
-        mean[m] = max(float(drawn[:, i].mean()) / sizes[m], 1.0)
-    inflation = mean[groups]
-    maxima = (drawn / inflation[wanted] / sizes[wanted]).max(axis=1)
+    inner, root = _noise_of(evidence, quiet)
+    rng = np.random.default_rng(seed)
+    drawn = np.array([_drawn(evidence, inner, root @ rng.standard_normal(len(root)), base) for _ in range(surrogates)])
+    inflation = np.maximum(drawn.mean(axis=0) / sizes, 1.0)[groups]
+    maxima = (drawn / inflation / sizes)[:, leaders].max(axis=1)
     # where tolerances are larger than the noise, noise alone gives almost no gain; the car's own deviations do
     threshold = max(_gumbel_quantile(maxima, level), bonferroni(level, len(leaders)))
     return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()), len(leaders))
+
+
+def _noise_of(evidence: Evidence, quiet: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Inner products (K, K) of the columns, and a root (K, K) of the covariance of theirs with noise."""
+    K = evidence.count
+    inner, covariance = np.zeros((K, K)), np.zeros((K, K))
+    for r, drive, ready in zip(quiet, evidence.drives, evidence.prepared, strict=True):
+        left = weighing(r, drive.mask, contrasts(drive.channels))
+        columns = whitened(ready, left.noise)
+        inner += columns @ columns.T
+        rows = left.coloured(columns.reshape(K, *r.shape))
+        covariance += rows @ rows.T
+    values, vectors = np.linalg.eigh(covariance)
+    return inner, np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
+
+
+def _drawn(evidence: Evidence, inner: FloatArray, b: FloatArray, base: Sequence[int]) -> FloatArray:
+    """Gains (H,) where the columns have these inner products with the residual."""
+    return gains_on_top(
+        evidence, tolerant(evidence, np.block([[inner, b[:, None]], [b[None], np.zeros((1, 1))]])), base
+    )
 
 
 def gumbel_p(maxima: FloatArray, x: float) -> float:
@@ -185,25 +195,3 @@ def _groups(evidence: Evidence, gram: FloatArray) -> np.ndarray[tuple[int], np.d
         else:
             leaders.append(i)
     return out
-
-
-def _restricted(evidence: Evidence, wanted: Sequence[int]) -> Evidence:
-    keep = [c for m in wanted for c in evidence.columns[m]]
-    columns, k = [], 0
-    for m in wanted:
-        columns.append(tuple(range(k, k + len(evidence.columns[m]))))
-        k += len(evidence.columns[m])
-    return replace(
-        evidence,
-        asked=tuple(evidence.asked[m] for m in wanted),
-        signatures=tuple(s[keep] for s in evidence.signatures),
-        prepared=tuple(p.of(keep) for p in evidence.prepared),
-        columns=tuple(columns),
-        prior=evidence.prior[keep],
-        low=evidence.low[keep],
-        high=evidence.high[keep],
-        smallest=evidence.smallest[keep],
-        tolerance=evidence.tolerance[keep],
-        barred=evidence.barred[list(wanted)],
-        spread=evidence.spread[keep],
-    )

@@ -66,11 +66,11 @@ class Arena:
         return self.sd.size
 
     def name(self, block: int) -> str:
-        """Name by which probabilities add up: the effect, or the mechanism of a shape."""
+        """Name by which probabilities add up: the effect, or the mechanism of a shape with `()`."""
         b = self.blocks[block]
         if b.kind == "effect":
             return self.evidence.asked[b.tag].effect.name
-        return self.shapes[b.tag].mechanism.name
+        return f"{self.shapes[b.tag].mechanism.name}()"
 
     def drawn(self, part: int, block: Block) -> FloatArray:
         """Scaled columns (k, C, n) of a block along a part."""

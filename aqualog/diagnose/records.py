@@ -31,13 +31,15 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """One effect that the measurement requires. `explains`: residual channels whose error it reduces."""
+    """One effect that the measurement requires. `explains`: residual channels whose error it reduces; `probability`
+    that the effect is there, NaN where no competition was held."""
 
     effect: str
     where: str | None
     parameters: Mapping[str, Estimate]
     explains: tuple[str, ...]
     sentence: str
+    probability: float = float("nan")
 
     @property
     def key(self) -> str:
@@ -129,11 +131,12 @@ class Confusion:
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
-    """Unexplained part of a channel after the best set, as a function: support mask, value, simultaneous 95 % band.
+    """An unknown form as a function: value and simultaneous 95 % band, NaN where the drive was not.
 
-    `x` (k, d) points of the coordinates `depends_on` [SI], `f`, `low`, `high` (k,) in the channel's unit; `share` of
-    the channel's variance that it explains; `proxies`: coordinates that explain it nearly as well; `nearest`: effect
-    whose signature is most alike, with the cosine.
+    `x` (k, d) points of the coordinates `depends_on` [SI], `f`, `low`, `high` (k,) in `unit`, or in the channel's if
+    that is empty; `mechanism` that it acts through, None of a campaign; `share` of the channel's variance that it
+    explains; `proxies`: coordinates that explain it nearly as well; `nearest`: effect whose signature is most alike,
+    with the cosine; `p_value` of a campaign's test, `probability` of a drive's mechanism.
     """
 
     channel: str
@@ -148,6 +151,9 @@ class Remainder:
     nearest: str | None
     cosine: float
     sentence: str
+    mechanism: str | None = None
+    unit: str = ""
+    probability: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True)

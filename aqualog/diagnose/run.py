@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,33 +13,32 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, widened
-from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
+from aqualog.diagnose.arena import make_arena
+from aqualog.diagnose.channels import CHANNELS, block_step
+from aqualog.diagnose.compete import compete
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
-from aqualog.diagnose.evidence import Evidence, Stack, without_deviations
+from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.grade import Profile, find_profile, with_profile
-from aqualog.diagnose.hypotheses import hypotheses, residual, value_in, with_values
+from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, value_in, with_values
+from aqualog.diagnose.judge import judged, repeats, with_causes
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
-from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.outcome import Outcome, conclude, one_per_name
 from aqualog.diagnose.records import Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView, Verdict
 from aqualog.diagnose.search import Found, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
-from aqualog.diagnose.unknown import find_remainders
-from aqualog.diagnose.unknown_term import as_term
+from aqualog.diagnose.unexplained import unknown_forms
+from aqualog.diagnose.unknown_term import as_term, short_form
 from aqualog.diagnose.words import verdict_sentence
 from aqualog.model.term import Model
 
 __all__ = ["Options", "diagnose"]
 
 LEAST_USED_S = 20.0
-WORTH_TELLING = 0.05  # of a channel's variance that a function must explain
 # rms of a road's slope that is named: on measured drives the logged elevation did not confirm about 1 %
 HILLY = 0.015
-FARTHEST = 3.0  # number of tolerances up to which a deviation counts as one
-PARTIAL = 0.2  # share of the remainder beside a cause, above which the cause is only the most similar one
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,11 +117,15 @@ def diagnose(
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(evidence, found.candidates, model, p_value=found.tests[0].p_value)
     outcome, agreed = _by_drive(evidence, found, outcome, model)
-    tell("describing what is not explained", 0.8)
-    outcome, remainders = _remainders(evidence, found, outcome, options)
+    tell("known effects against unknown forms", 0.8)
+    arena = make_arena(evidence, model)
+    posterior = compete(arena)
+    remainders = unknown_forms(arena, posterior, seed=options.seed)
+    failed = repeats(outcome.chosen, arena, found.noises, model) if outcome.chosen is not None else ()
+    outcome = judged(outcome, remainders, arena, posterior, model, failed)
     if road is not None:
         outcome = _with_road(outcome, road, named=hilly)
-    extended = _extended(outcome, remainders, model if hilly else given, vehicle)
+    extended = _extended(outcome, remainders, model if hilly else given, asked)
     sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.inflation, found.calibration.threshold)
     before = [_led(d, given) for d in ready] if road is not None else list(evidence.residuals)
     after = [_led(d, extended) for d in ready] if extended.terms != model.terms else list(evidence.residuals)
@@ -159,9 +161,7 @@ def diagnose(
 
 
 def _sentence(outcome: Outcome, remainders: tuple[Remainder, ...], found: Found, options: Options) -> str:
-    reason = (
-        f" ({remainders[0].sentence.rstrip('.')})" if remainders else ", and no function of the logged quantities does"
-    )
+    reason = f" ({short_form(remainders[0])})" if remainders else ", and no function of the logged quantities does"
     p = found.tests[0].p_value
     return verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
@@ -238,54 +238,10 @@ def _unnamed(outcome: Outcome, found: Found, options: Options) -> tuple[str, ...
     return (f"The test found more than noise (p = {p:.2g}), but no effect large enough to be worth naming.",)
 
 
-def _remainders(
-    evidence: Evidence, found: Found, outcome: Outcome, options: Options
-) -> tuple[Outcome, tuple[Remainder, ...]]:
-    """Functions in the remainder of the longest drive; they overrule a cause that explains less than they do."""
-    d = max(range(len(evidence.drives)), key=lambda i: evidence.drives[i].used_s)
-    named = outcome.verdict in ("named", "compound", "cannot_tell") and outcome.chosen is not None
-    left = outcome.chosen.residuals[d] if named and outcome.chosen is not None else evidence.residuals[d]
-    remainders = _functions(evidence, found, d, left, options)
-    if not remainders:
-        return outcome, ()
-    if named:
-        own = {c for cause in outcome.causes for c in cause.explains}
-        strong = [r for r in remainders if r.channel in own and r.share > PARTIAL]
-        if not strong:
-            return outcome, remainders
-        whole = _functions(evidence, found, d, evidence.residuals[d], options)
-        if not whole:
-            return outcome, remainders
-        remainders = whole
-    return Outcome("unexplained", (), (), None, outcome.small), remainders
-
-
-def _functions(evidence: Evidence, found: Found, d: int, left: FloatArray, options: Options) -> tuple[Remainder, ...]:
-    drive = evidence.drives[d]
-    # an error of a water law within the range of its sources is not an unexplained function, nor is what the car's
-    # drives differ by
-    open_ = [c for h, columns in zip(evidence.asked, evidence.columns, strict=True) if h.of_water for c in columns]
-    left = without_deviations(evidence, d, left, sorted({*open_, *np.flatnonzero(evidence.spread > 0.0).tolist()}))
-    # nor are the usual errors of a file or a tyre
-    left = without_deviations(evidence, d, left, range(evidence.count), farthest=FARTHEST)
-    noise = fit_noise(left, drive.mask, contrasts(drive.channels))
-    stack = Stack(left, drive.mask, block_step(drive.dt), drive.channels, drive.coordinates, noise)
-    known: dict[str, FloatArray] = {}
-    for h, columns in zip(evidence.asked, evidence.columns, strict=True):
-        if not h.allowed:
-            known.setdefault(h.key, evidence.signatures[d][columns[0]])
-    surrogates = max(options.surrogates, round(1.0 / options.level) - 1)
-    remainders = find_remainders(stack, signatures=known, level=options.level, seed=options.seed, surrogates=surrogates)
-    sd = dict(zip(drive.channels, left[:, drive.mask].std(axis=1).tolist(), strict=True))
-    least = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}
-    return tuple(
-        r for r in remainders
-        if r.share > WORTH_TELLING and math.sqrt(r.share) * sd[r.channel] > least[CHANNELS[r.channel].unit]
-    )  # fmt: skip
-
-
-def _extended(outcome: Outcome, remainders: tuple[Remainder, ...], model: Model, vehicle: Vehicle) -> Model:
+def _extended(outcome: Outcome, remainders: Sequence[Remainder], model: Model, asked: Sequence[Hypothesis]) -> Model:
     extended = model
+    if outcome.verdict == "unexplained":
+        extended = with_causes(model, [c for c in outcome.causes if c.key in {h.key for h in asked}], asked)
     if outcome.chosen is not None:
         # effects too small to be named are not put into the model either
         named = {c.key for c in outcome.causes}
@@ -296,7 +252,7 @@ def _extended(outcome: Outcome, remainders: tuple[Remainder, ...], model: Model,
             if h.key in named
         ])  # fmt: skip
     for r in remainders:
-        term = as_term(r, mass=vehicle.mass)
+        term = as_term(r)
         if term is not None and all(t.effect is not term.effect for t in extended.terms):
             extended = extended.with_term(term)
     return extended

@@ -109,9 +109,8 @@ def search(
         sets = best_sets(work, gram, len(accepted) + 1, within=0.0, most=1) if len(accepted) < MOST else []
         quiet = _after(work, sets[0]) if sets else list(work.residuals)
         calibration = calibrate(
-            work, quiet, gram, base=accepted, surrogates=surrogates, level=level, seed=seed + len(tests),
-            tick=_ticker(tell, 0.3 + 0.1 * len(tests), surrogates),
-        )  # fmt: skip
+            work, quiet, gram, base=accepted, surrogates=surrogates, level=level, seed=seed + len(tests)
+        )
         tests.append(_tested(work, gains, accepted, calibration, level, surrogates))
         first = first or (gram, calibration)
         least = FURTHER * calibration.threshold if accepted else 0.0
@@ -130,17 +129,6 @@ def search(
     quiet = list(candidates[0].refit.residuals) if candidates else list(evidence.residuals)
     noises = tuple(fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, evidence.drives, strict=True))
     return Found(tuple(tests), first[0], first[1], candidates, noises)
-
-
-def _ticker(tell: Tell, start: float, surrogates: int) -> Callable[[], None]:
-    done = [0]
-
-    def tick() -> None:
-        done[0] += 1
-        share = min(start + 0.1 * done[0] / surrogates, 0.95)
-        tell(f"simulated noise with the same spectrum: {done[0]} of {surrogates}", share)
-
-    return tick
 
 
 def _tested(

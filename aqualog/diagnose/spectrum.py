@@ -7,7 +7,6 @@ column under noise alone follows its chi-squared distribution. Surrogates of the
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,9 +53,16 @@ class Weighing:
         return out
 
     def _rows(self, x: FloatArray) -> FloatArray:
-        flat = whitened(spectra(bridged(x, self.mask)), self.noise).reshape(x.shape)
-        lines = np.matmul(self.inverse, _lines(flat[..., self.used], self.size).transpose(2, 1, 0))  # (F, C, k)
-        return np.concatenate([lines.real, lines.imag]).reshape(-1, len(x)).T
+        return self._turned(whitened(spectra(bridged(x, self.mask)), self.noise).reshape(x.shape), self.inverse)
+
+    def coloured(self, flat: FloatArray) -> FloatArray:
+        """Rows of columns (k, C, n) that the autoregression has whitened: their inner products are the covariance of
+        the columns' inner products with the noise that is left."""
+        return self._turned(flat, np.linalg.inv(self.inverse).astype(np.complex128).conj().transpose(0, 2, 1))
+
+    def _turned(self, flat: FloatArray, by: Complex) -> FloatArray:
+        lines = np.matmul(by, _lines(flat[..., self.used], self.size).transpose(2, 1, 0))  # (F, C, k)
+        return np.concatenate([lines.real, lines.imag]).reshape(-1, len(flat)).T
 
 
 def weighing(residual: FloatArray, mask: BoolArray, contrasts: FloatArray, noise: Noise | None = None) -> Weighing:
@@ -115,8 +121,3 @@ def _averaged(cross: Complex) -> Complex:
     at = np.arange(count) + width
     means: Complex = (total[at + reach + 1] - total[at - reach]) / (2.0 * reach + 1.0)[:, None, None]
     return means
-
-
-def gram(rows: Iterable[FloatArray]) -> FloatArray:
-    """Inner products of rows, summed over drives."""
-    return np.asarray(sum(r @ r.T for r in rows))

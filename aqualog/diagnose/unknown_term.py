@@ -2,56 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.records import Remainder
-from aqualog.diagnose.unknown_proxy import Choice
+from aqualog.diagnose.shapes import MECHANISMS, Mechanism
+from aqualog.diagnose.words import quantity
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Term
-from aqualog.physics.load import G
 
-__all__ = ["as_term", "describe"]
+__all__ = ["as_term", "describe", "short_form"]
 
-# channel and coordinates that the plant or the road has a table for
-_CARRIED: dict[tuple[str, tuple[str, ...]], str] = {
-    ("force_balance", ("v_x",)): "unexplained_force",
-    ("kinematic", ("position",)): "unexplained_grade",
+# mechanism and coordinates that the plant or the road has a table for
+_CARRIED: dict[tuple[str | None, tuple[str, ...]], str] = {
+    ("force", ("v_x",)): "unexplained_force",
+    ("road", ("position",)): "unexplained_grade",
 }
 TAPER = 0.08  # of the range: beyond the driven range, the function falls to zero over this share
 ROUGH = 0.15  # of the band's half width: knots that change the function by less are left out
 SHORT_HOLE = 4  # points; a longer stretch without data is nominal
 
 
-def as_term(remainder: Remainder, *, mass: float, response: float | None = None) -> Term | None:
+def as_term(remainder: Remainder) -> Term | None:
     """The term that takes a remainder into the model.
-
-    Parameters
-    ----------
-    remainder : Remainder
-        Measured minus simulated.
-    mass : float
-        Of the car in the model. [kg]
-    response : float, optional
-        Change of the channel by one unit of the term (1 N against the motion, 1 rad uphill). Without: -1 / mass for a
-        force on the acceleration (Newton), g for a slope angle on an accelerometer.
 
     Returns
     -------
     term : Term or None
         The function within the driven range; outside it falls to zero over a short distance. None if
-        the model has no table for this channel over these coordinates, or the function is beyond physical bounds.
+        the model has no table for this mechanism over these coordinates, or the function is beyond physical bounds.
     """
-    name = _CARRIED.get((remainder.channel, remainder.depends_on))
+    name = _CARRIED.get((remainder.mechanism, remainder.depends_on))
     if name is None:
         return None
     effect = EMPIRICAL[name]
     table = effect.table
     assert table is not None
-    per_unit = response if response is not None else (-1.0 / mass if name == "unexplained_force" else G)
-    x = remainder.x[:, 0]
-    values = remainder.f / per_unit
-    tolerance = ROUGH * float(np.nanmedian(np.abs((remainder.high - remainder.low) / (2.0 * per_unit))))
+    x, values = remainder.x[:, 0], remainder.f
+    tolerance = ROUGH * float(np.nanmedian(np.abs((remainder.high - remainder.low) / 2.0)))
     reach = TAPER * float(np.ptp(x))
     knots: dict[float, float] = {}
     runs = _runs(np.isfinite(values))
@@ -128,34 +118,37 @@ ALIKE = 0.9  # cosine from which a known effect looks nearly the same
 
 
 def describe(
-    channel: str, choice: Choice, x: FloatArray, f: FloatArray, low: FloatArray, high: FloatArray, share: float,
-    nearest: str | None, cosine: float,
+    mechanism: Mechanism, names: Sequence[str], x: FloatArray, f: FloatArray, low: FloatArray, high: FloatArray, *,
+    probability: float, channel: str, share: float, alike: Sequence[str], nearest: str | None, cosine: float,
 ) -> str:  # fmt: skip
-    """Sentences: the coordinate that the remainder depends on, its largest value, other explanations, similar effects.
+    """Sentences: mechanism and coordinate, its largest value, coordinates that explain it as well, similar effects.
 
     `x` (k, d), `f`, `low`, `high` (k,) as in a `Remainder`: NaN where the drive was not.
     """
-    title, unit = _CHANNELS.get(channel, (channel, "?"))
-    of = " and ".join(_word(n) for n in choice.names)
-    text = f"The unexplained part of the {title} depends on {of} ({share:.0%} of the variance"
+    title = _CHANNELS.get(channel, (channel, "?"))[0]
+    of = " and ".join(_word(n) for n in names)
+    text = f"Unexplained: {mechanism.title} goes with {of} (probability {probability:.2f}"
+    text += f"; {share:.0%} of the variance of the {title}"
     sure = np.isfinite(f) & ((low > 0.0) | (high < 0.0))
     if sure.any():
         at = int(np.argmax(np.where(sure, np.abs(f), -1.0)))
-        there = ", ".join(f"{v:.4g} {_unit(n)}".removesuffix(" -") for n, v in zip(choice.names, x[at], strict=True))
-        text += f"; {f[at]:+.3g} {unit}".removesuffix(" -") + f" at {there}"
+        there = ", ".join(f"{v:.4g} {_unit(n)}".removesuffix(" -") for n, v in zip(names, x[at], strict=True))
+        text += f"; {quantity(float(f[at]), mechanism.unit, change=True)} at {there}"
     text += ")."
-    if choice.proxies:
-        is_, are = ("is", "a proxy") if len(choice.proxies) == 1 else ("are", "proxies")
-        text += f" {_list(choice.proxies).capitalize()} {is_} only {are}."
-    plain = [e for e in choice.equals if not choice.along or e not in ("t", "position")]
-    if plain:
-        text += f" This drive cannot distinguish it from {_list(plain)}."
-    if choice.along:
+    if alike:
+        text += f" This drive cannot distinguish it from {_list(list(alike))}."
+    if {"t", "position"} & set(names):
         text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."
     if nearest is not None:
-        alike = "looks nearly the same" if cosine >= ALIKE else "is the nearest known effect"
-        text += f" {nearest} {alike} (similarity {cosine:.2f} of 1)."
+        same = "looks nearly the same" if cosine >= ALIKE else "is the nearest known effect"
+        text += f" {nearest} {same} (similarity {cosine:.2f} of 1)."
     return text
+
+
+def short_form(remainder: Remainder) -> str:
+    """`a force on the car that goes with speed`."""
+    title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), remainder.channel)
+    return f"{title} that goes with {' and '.join(_word(n) for n in remainder.depends_on)}"
 
 
 def _word(name: str) -> str:

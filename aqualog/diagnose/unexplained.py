@@ -1,0 +1,138 @@
+"""Unknown forms that a competition has found: of what mechanism, over which coordinate, how large, like which one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.diagnose.arena import Arena
+from aqualog.diagnose.channels import CHANNELS
+from aqualog.diagnose.compete import Fitted, Posterior, fitted
+from aqualog.diagnose.competition import added, scored, start
+from aqualog.diagnose.probability import SURE, tempered
+from aqualog.diagnose.records import Remainder
+from aqualog.diagnose.unknown_term import describe
+
+__all__ = ["evidence_of", "unknown_forms"]
+
+AHEAD = 5.0  # [nats] that the best set must be ahead of the best one without unknown shapes
+PART = 0.2  # of what the best set explains
+WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
+LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what it explains, by the channel's unit
+NOTABLE = 0.05  # probability from which another coordinate is mentioned
+ALIKE = 0.2  # share of the best coordinate's probability from which the drive cannot distinguish another
+DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points together
+
+
+def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
+    """Shapes of the best set that no known effect replaces, what explains most first; empty if none is that clear.
+
+    A shape counts if the probability of its mechanism is 0.95, the best set is 5 nats ahead of the best one of known
+    effects, and the shape explains a fifth of what the set explains and 5 % of a channel's variance.
+    """
+    blocks = arena.blocks
+    best = posterior.best
+    known = max(e for members, e in posterior.sets if all(blocks[m].kind != "shape" for m in members))
+    if posterior.sets[0][1] - known < AHEAD:
+        return ()
+    whole = evidence_of(arena, posterior.tolerant, best)
+    fit = fitted(arena, posterior.tolerant, best)
+    found = []
+    for m in best:
+        probability = tempered(posterior.marginal[arena.name(m)])
+        if blocks[m].kind != "shape" or probability < SURE:
+            continue
+        loss = whole - evidence_of(arena, posterior.tolerant, [o for o in best if o != m])
+        channel, share = _where(arena, m, fit)
+        if loss >= PART * whole and channel is not None:
+            found.append((loss, _described(arena, posterior, m, fit, probability, channel, share, seed)))
+    return tuple(r for _, r in sorted(found, key=lambda x: -x[0]))
+
+
+def evidence_of(arena: Arena, tolerant: FloatArray, members: Sequence[int]) -> float:
+    """Log of the marginal likelihood that a set gains, without its prior. [nats]"""
+    state, total = start(tolerant), 0.0
+    for m in members:
+        total += scored(state, arena.blocks[m])[0]
+        state = added(state, m, arena.blocks[m])
+    return total
+
+
+def _own(arena: Arena, m: int, fit: Fitted) -> list[int]:
+    """Where a block's columns are in a fit."""
+    return [fit.columns.index(c) for c in arena.blocks[m].columns]
+
+
+def _where(arena: Arena, m: int, fit: Fitted) -> tuple[str | None, float]:
+    """The channel of whose variance a shape explains most, and that share; None if it is not worth telling anywhere."""
+    mean = fit.mean[_own(arena, m, fit)]
+    before, after, made = [], [], []
+    for i, p in enumerate(arena.parts):
+        f = np.tensordot(mean, arena.drawn(i, arena.blocks[m]), axes=1)[:, p.mask]
+        y = p.residual[:, p.mask]
+        before.append(y)
+        after.append(y - f)
+        made.append(f)
+    y, left, f = (np.concatenate(x, axis=1) for x in (before, after, made))
+    share = 1.0 - left.var(axis=1) / np.maximum(y.var(axis=1), 1e-30)
+    rms = np.sqrt((f**2).mean(axis=1))
+    channels = arena.parts[0].channels
+    told = [
+        (float(s), c) for s, r, c in zip(share, rms, channels, strict=True)
+        if s > WORTH_TELLING and r > LEAST[CHANNELS[c].unit]
+    ]  # fmt: skip
+    return (max(told)[1], max(told)[0]) if told else (None, 0.0)
+
+
+def _described(
+    arena: Arena, posterior: Posterior, m: int, fit: Fitted, probability: float, channel: str, share: float, seed: int
+) -> Remainder:  # fmt: skip
+    block = arena.blocks[m]
+    s = arena.shapes[block.tag]
+    own = _own(arena, m, fit)
+    at = s.basis.at_points * arena.sd[list(block.columns)]
+    f = at @ fit.mean[own]
+    half = _band(at, fit.covariance[np.ix_(own, own)], s.basis.supported, seed)
+    f, half = (np.where(s.basis.supported, x, np.nan) for x in (f, half))
+    others = {
+        arena.shapes[arena.blocks[o].tag].coordinates: q
+        for o, q in posterior.blocks.items()
+        if o != m and arena.blocks[o].kind == "shape" and arena.name(o) == arena.name(m) and q >= NOTABLE
+    }
+    alike = sorted({n for c, q in others.items() if q >= ALIKE * posterior.blocks[m] for n in c} - set(s.coordinates))
+    nearest, cosine = _nearest(arena, posterior.gram, m, fit.mean[own])
+    sentence = describe(
+        s.mechanism, s.coordinates, s.basis.points, f, f - half, f + half,
+        probability=probability, channel=channel, share=share, alike=alike, nearest=nearest, cosine=cosine,
+    )  # fmt: skip
+    return Remainder(
+        channel, s.coordinates, share, math.nan, s.basis.points, f, f - half, f + half, tuple(alike), nearest, cosine,
+        sentence, s.mechanism.name, s.mechanism.unit, probability,
+    )  # fmt: skip
+
+
+def _band(at: FloatArray, covariance: FloatArray, supported: BoolArray, seed: int) -> FloatArray:
+    """Half width of a band that the function leaves nowhere with 95 %. (k,)"""
+    sd = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", at, covariance, at), 1e-30))
+    root = np.linalg.cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(len(covariance)))
+    z = at @ root @ np.random.default_rng(seed).standard_normal((len(covariance), DRAWS))
+    most = np.abs(z / sd[:, None])[supported].max(axis=0) if np.any(supported) else np.ones(1)
+    return np.asarray(sd * float(np.quantile(most, LEVEL)))
+
+
+def _nearest(arena: Arena, gram: FloatArray, m: int, mean: FloatArray) -> tuple[str | None, float]:
+    """The known effect whose signature is most alike, with the cosine."""
+    c = list(arena.blocks[m].columns)
+    energy = float(mean @ gram[np.ix_(c, c)] @ mean)
+    best: tuple[str | None, float] = (None, 0.0)
+    for b in arena.blocks:
+        if b.kind != "effect" or len(b.columns) > 1 or energy <= 0.0:
+            continue
+        e = b.columns[0]
+        cosine = abs(float(gram[e, c] @ mean)) / math.sqrt(max(energy * gram[e, e], 1e-30))
+        if cosine > best[1]:
+            best = (b.key, min(cosine, 1.0))
+    return best
