@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -24,7 +24,7 @@ from aqualog.diagnose.spectrum import Weighing, weighing
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
 
-__all__ = ["Arena", "Part", "make_arena", "unit_force"]
+__all__ = ["Arena", "Part", "arena_of", "known_only", "make_arena", "unit_force"]
 
 KNOWN_PRIOR, SHAPE_PRIOR = 0.03, 0.01  # of an effect at any place, and of a shape of a mechanism, on one drive (K)
 MOST_BLOCKS = 12000  # of 0.1 s that compete; a longer drive does with its best 20 min
@@ -116,7 +116,7 @@ class Arena:
         return total
 
     def tolerant(self, gram: FloatArray) -> FloatArray:
-        """Inner products that forgive the tolerances, by Woodbury's identity [woodbury1950]."""
+        """Inner products that forgive the tolerances, by Woodbury's identity."""
         k = np.flatnonzero((np.diag(self.tolerance) > 0.0) & (np.diag(gram)[:-1] > 1e-12))
         P = self.tolerance[np.ix_(k, k)]
         root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
@@ -177,6 +177,17 @@ def arena_of(evidence: Evidence, forces: Sequence[FloatArray]) -> Arena:
     rows = tuple(slice(a, b) for a, b in pairwise(ends.tolist()))
     blocks, sd = _blocks(evidence, made)
     return Arena(evidence, tuple(parts), rows, made, blocks, sd, _tolerance(evidence, made, blocks, sd))
+
+
+def known_only(arena: Arena) -> Arena:
+    """The arena without shapes, and without the tolerances along coordinates.
+
+    Those tolerances forgive a drag or a slip slope that is off by several of its own. Whether a form is unknown must
+    not depend on them; which known effect it is may be judged more sharply.
+    """
+    k = arena.evidence.count
+    blocks = tuple(b for b in arena.blocks if b.kind == "effect")
+    return replace(arena, shapes=(), blocks=blocks, sd=arena.sd[:k], tolerance=arena.tolerance[:k, :k])
 
 
 def _stretches(drives: Sequence[Drive]) -> list[tuple[int, slice]]:

@@ -14,7 +14,7 @@ MOST = 0.999
 def tempered(p: float) -> float:
     """The probability that a name is right, of the share `p` of the posterior that has it.
 
-    The logit of the share is scaled and shifted (temperature scaling [platt1999]) so that probabilities are as often
+    The logit of the share is scaled and shifted (Platt's scaling) so that probabilities are as often
     right as they say.
     """
     p = min(max(p, 1e-9), 1.0 - 1e-9)

@@ -13,7 +13,7 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, widened
-from aqualog.diagnose.arena import make_arena
+from aqualog.diagnose.arena import known_only, make_arena
 from aqualog.diagnose.channels import CHANNELS, block_step
 from aqualog.diagnose.compete import compete
 from aqualog.diagnose.consequence import consequences
@@ -122,6 +122,9 @@ def diagnose(
     posterior = compete(arena)
     remainders = unknown_forms(arena, posterior, seed=options.seed)
     failed = repeats(outcome.chosen, arena, found.noises, model) if outcome.chosen is not None else ()
+    if not remainders:
+        arena = known_only(arena)
+        posterior = compete(arena)
     outcome = judged(outcome, remainders, arena, posterior, model, failed)
     if road is not None:
         outcome = _with_road(outcome, road, named=hilly)

@@ -30,8 +30,8 @@ DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points
 def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
     """Shapes of the best set that no known effect replaces, what explains most first; empty if none is that clear.
 
-    A shape counts if the probability of its mechanism is 0.95, the best set is 5 nats ahead of the best one of known
-    effects, and the shape explains a fifth of what the set explains and 5 % of a channel's variance.
+    A mechanism counts if its probability is 0.95, the best set is 5 nats ahead of the best one of known effects, and it
+    explains a fifth of what the set explains and 5 % of a channel's variance.
     """
     blocks = arena.blocks
     best = posterior.best
@@ -41,14 +41,18 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     whole = evidence_of(arena, posterior.tolerant, best)
     fit = fitted(arena, posterior.tolerant, best)
     found = []
-    for m in best:
-        probability = tempered(posterior.marginal[arena.name(m)])
-        if blocks[m].kind != "shape" or probability < SURE:
+    shapes = [m for m in best if blocks[m].kind == "shape"]
+    for name in dict.fromkeys(arena.name(m) for m in shapes):
+        own = [m for m in shapes if arena.name(m) == name]
+        probability = tempered(posterior.marginal[name])
+        if probability < SURE:
             continue
-        loss = whole - evidence_of(arena, posterior.tolerant, [o for o in best if o != m])
-        channel, share = _where(arena, m, fit)
+        # over two coordinates that go together, either could be left out; the mechanism could not
+        loss = whole - evidence_of(arena, posterior.tolerant, [m for m in best if m not in own])
+        channel, share = _where(arena, own, fit)
         if loss >= PART * whole and channel is not None:
-            found.append((loss, _described(arena, posterior, m, fit, probability, channel, share, seed)))
+            first = min(own, key=lambda m: evidence_of(arena, posterior.tolerant, [o for o in best if o != m]))
+            found.append((loss, _described(arena, posterior, first, fit, probability, channel, share, seed)))
     return tuple(r for _, r in sorted(found, key=lambda x: -x[0]))
 
 
@@ -66,12 +70,14 @@ def _own(arena: Arena, m: int, fit: Fitted) -> list[int]:
     return [fit.columns.index(c) for c in arena.blocks[m].columns]
 
 
-def _where(arena: Arena, m: int, fit: Fitted) -> tuple[str | None, float]:
-    """The channel of whose variance a shape explains most, and that share; None if it is not worth telling anywhere."""
-    mean = fit.mean[_own(arena, m, fit)]
+def _where(arena: Arena, members: Sequence[int], fit: Fitted) -> tuple[str | None, float]:
+    """The channel of whose variance shapes explain most, and that share; None if it is not worth telling anywhere."""
     before, after, made = [], [], []
     for i, p in enumerate(arena.parts):
-        f = np.tensordot(mean, arena.drawn(i, arena.blocks[m]), axes=1)[:, p.mask]
+        f = sum(
+            (np.tensordot(fit.mean[_own(arena, m, fit)], arena.drawn(i, arena.blocks[m]), axes=1) for m in members),
+            np.zeros_like(p.residual),
+        )[:, p.mask]
         y = p.residual[:, p.mask]
         before.append(y)
         after.append(y - f)

@@ -96,6 +96,9 @@ def verdict_sentence(
         open_ones = [name_of(c.effect, c.where) for c in causes if c.effect not in certain]
         if sure and open_ones:
             return f"Certain: {listed(sure)}. This log cannot distinguish the other causes: {listed(open_ones, 'or')}."
+        if len(causes) == 1 and not sure:
+            odds = "" if math.isnan(causes[0].probability) else f" (probability {causes[0].probability:.2f})"
+            return f"The car may differ from the model, but this log does not make it certain: {names[0]}{odds}."
         return f"The car differs from the model, but this log cannot distinguish {listed(names)}."
     if verdict == "unexplained":
         known = f" beside {listed(names)}" if names else ""

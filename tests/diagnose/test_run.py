@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from aqualog.core.errors import SignalError
-from aqualog.diagnose import run
+from aqualog.diagnose import arena, run
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
@@ -22,7 +22,7 @@ QUICK = Options(level=0.01, surrogates=9, views=False, consequences=False)
 def few(monkeypatch):
     """Few effects and no search for functions, so that a diagnosis takes a second."""
     ask(monkeypatch, FEW)
-    monkeypatch.setattr(run, "find_remainders", lambda *_, **__: ())
+    monkeypatch.setattr(arena, "shapes", lambda *_: ())
 
 
 def ask(monkeypatch, names):
@@ -57,6 +57,7 @@ def test_named_with_its_size_and_gain():
     d = told(term("payload_mass", delta_mass=250.0))
     assert d.verdict == "named"
     assert keys(d) == {"payload_mass"}
+    assert d.causes[0].probability > 0.95
     e = d.causes[0].parameters["delta_mass"]
     assert e.low < 250.0 < e.high
     assert e.high - e.low < 100.0
@@ -112,32 +113,31 @@ def test_a_slope_and_an_offset_without_torque(monkeypatch):
     assert d.alternatives[0].evidence_ratio < 20.0
 
 
-def function_of_speed(share):
+def function_of_speed():
     x = np.linspace(15.0, 30.0, 10)
-    f = 0.1 * np.sin(x)
+    f = 100.0 * np.sin(x)
     return Remainder(
-        "force_balance", ("v_x",), share, 0.01, x[:, None], f, f - 0.05, f + 0.05, (), None, 0.0, "It goes with the speed."
+        "force_balance", ("v_x",), 0.9, 0.01, x[:, None], f, f - 50.0, f + 50.0, (), None, 0.0, "It goes with the speed.",
+        "force", "N", 0.99,
     )  # fmt: skip
 
 
-def test_a_function_without_an_effect_is_unexplained(monkeypatch):
-    monkeypatch.setattr(run, "find_remainders", lambda *_, **__: (function_of_speed(0.9),))
-    log = noisy()
-    wave = 0.3 * np.sin(2.0 * np.pi * 0.05 * np.arange(log.frame.height) * 0.01)
-    d = told(log=changed(log, log.frame.with_columns(pl.Series("a_x", log.array("a_x") + wave))))
+def test_an_unknown_form_is_the_verdict_and_in_the_model(monkeypatch):
+    monkeypatch.setattr(run, "unknown_forms", lambda *_, **__: (function_of_speed(),))
+    d = told()
     assert d.verdict == "unexplained"
     assert d.causes == ()
-    assert "(It goes with the speed)" in d.sentence
+    assert "(a force on the car that goes with speed)" in d.sentence
     assert d.remainders[0].channel == "force_balance"
+    assert [t.effect.name for t in d.model.terms] == ["unexplained_force"]
 
 
-@pytest.mark.parametrize(("share", "verdict"), [(0.5, "unexplained"), (0.1, "named")])
-def test_a_function_overrules_a_cause_that_leaves_much(monkeypatch, share, verdict):
-    monkeypatch.setattr(run, "_functions", lambda *_: (function_of_speed(share),))
+def test_effects_that_are_certain_stand_beside_an_unknown_form(monkeypatch):
+    monkeypatch.setattr(run, "unknown_forms", lambda *_, **__: (function_of_speed(),))
     d = told(term("payload_mass", delta_mass=250.0))
-    assert d.verdict == verdict
-    assert keys(d) == (set() if verdict == "unexplained" else {"payload_mass"})
-    assert len(d.remainders) == 1
+    assert d.verdict == "unexplained"
+    assert keys(d) == {"payload_mass"}
+    assert {t.effect.name for t in d.model.terms} == {"payload_mass", "unexplained_force"}
 
 
 def test_too_little_driving_is_not_testable():

@@ -103,17 +103,17 @@ def _cause(c: Cause) -> dict[str, Any]:
     return {
         **fields_of(c, "effect", "where", "key"),
         "parameters": {name: _estimate(e) for name, e in c.parameters.items()},
-        **fields_of(c, "explains", "sentence"),
+        **fields_of(c, "explains", "sentence", "probability"),
     }
 
 
 def _remainder(r: Remainder) -> dict[str, Any]:
     x = np.asarray(r.x, dtype=np.float64).reshape(len(r.f), -1)
     return {
-        **fields_of(r, "channel", "depends_on", "share", "p_value"),
+        **fields_of(r, "channel", "mechanism", "unit", "depends_on", "share", "p_value", "probability"),
         "x": plain(x),
         **{name: plain(np.asarray(getattr(r, name), dtype=np.float64)) for name in ("f", "low", "high")},
-        **fields_of(r, "proxies", "nearest", "cosine", "sentence"),
+        **fields_of(r, "proxies", "nearest", "cosine", "sentence", similar_to="nearest"),
     }
 
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from aqualog.report.diagnosis.views import AFTER, BEFORE, coordinate_axis
-from aqualog.report.diagnosis.words import by_change, channel_title, effect_title
+from aqualog.report.diagnosis.words import by_change, channel_title, effect_title, mechanism_title
 from aqualog.report.figures import GOOD_TO_BAD, axis, band, bars, dots, figure, heat, line, see_through
 from aqualog.report.theme import MUTED
-from aqualog.report.values import measured, percent, plot_text, pretty_unit
+from aqualog.report.values import measured, percent, plot_text, pretty_unit, upper_first
 
 __all__ = ["AFTER", "BEFORE", "gain_bars", "isolability", "plots", "remainder"]
 
@@ -80,8 +80,8 @@ def remainder(r: Mapping[str, Any], document: Mapping[str, Any]) -> dict[str, An
     """Unexplained part of a channel over the one or two coordinates that it depends on; None without points."""
     if not r["f"] or not r["depends_on"]:
         return None
-    unit = plot_text(pretty_unit(document["channel_units"].get(r["channel"], "")))
-    title = f"{plot_text(channel_title(r['channel']), 40)}, not explained{f' [{unit}]' if unit else ''}"
+    unit = plot_text(pretty_unit(r.get("unit") or document["channel_units"].get(r["channel"], "")))
+    title = f"{plot_text(upper_first(mechanism_title(r)), 40)}, not explained{f' [{unit}]' if unit else ''}"
     columns = [
         [None if v is None else float(f"{factor * v + offset:.6g}") for v in column]
         for column, (_, factor, offset) in zip(

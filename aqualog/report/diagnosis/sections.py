@@ -34,7 +34,12 @@ def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] 
     d, said = document, sentences(document)
     figures = plots(d)
     causes = [x for c in d["causes"] for x in c["explains"]]
-    answers = [("Test", said["test"]), ("Gain", said["score"]), ("Next", said["manoeuvre"])]
+    answers = [
+        ("Probability", said["probability"]),
+        ("Test", said["test"]),
+        ("Gain", said["score"]),
+        ("Next", said["manoeuvre"]),
+    ]
     head = Headline(said["headline"][0], [(k, x[0]) for k, x in answers if x], verdict_title(d["verdict"]))
     level = percent(d["criteria"]["interval"])
     sections = [

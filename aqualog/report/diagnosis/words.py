@@ -6,12 +6,13 @@ import math
 from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any
 
+from aqualog.diagnose.shapes import MECHANISMS
 from aqualog.report.values import interval_text, measured, percent, pretty_unit, short, upper_first
 from aqualog.report.wording import detector_name
 
 __all__ = [
     "COORDINATES", "by_change", "by_sharpness", "channel_title", "coordinate_title", "effect_title", "limit_sentences",
-    "sentences", "verdict_title",
+    "mechanism_title", "sentences", "verdict_title",
 ]  # fmt: skip
 
 WORSE = 0.01  # rise of a channel's error that is reported
@@ -99,6 +100,7 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
     return {
         "headline": [document["sentence"] or f"{verdict_title(document['verdict'])}."],
         "test": _test(document["significance"]),
+        "probability": _probabilities(document["causes"]),
         "causes": [c["sentence"] for c in document["causes"] if c["sentence"] not in ("", document["sentence"])],
         "alternatives": [_alternative(a) for a in document["alternative_sets"]],
         "relations": _alike(document["isolability"], causes),
@@ -307,7 +309,21 @@ def _manoeuvre(m: Mapping[str, Any] | None) -> list[str]:
     return [*said, f"Probability of the right name: {now} now, {then} after this drive{lasting}."]
 
 
+def mechanism_title(r: Mapping[str, Any]) -> str:
+    """What a remainder acts through, or its channel."""
+    titles = {m.name: m.title for m in MECHANISMS}
+    return titles.get(r.get("mechanism") or "", channel_title(r["channel"]))
+
+
+def _probabilities(causes: Sequence[Mapping[str, Any]]) -> list[str]:
+    """`head wind 0.73, aero drag 0.26`."""
+    known = [f"{effect_title(c['key'])} {c['probability']:.2f}" for c in causes if c.get("probability") is not None]
+    return [", ".join(known)] if known else []
+
+
 def _unexplained(r: Mapping[str, Any]) -> str:
+    if r.get("mechanism"):
+        return str(r["sentence"])
     coordinates = " and ".join(coordinate_title(x) for x in r["depends_on"])
     said = r["sentence"] or f"{upper_first(channel_title(r['channel']))} depends on {coordinates}."
     parts = [f"{percent(r['share'])} of the variance"] if r["share"] is not None else []

@@ -1,0 +1,208 @@
+"""Unknown forms: found in a drive through the competition, described as functions, taken into a model as terms."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from aqualog.core.vehicle import Vehicle
+from aqualog.diagnose import run
+from aqualog.diagnose.arena import arena_of
+from aqualog.diagnose.compete import compete
+from aqualog.diagnose.competition import Block, added, scored, start
+from aqualog.diagnose.evidence import make_evidence
+from aqualog.diagnose.hypotheses import hypotheses
+from aqualog.diagnose.records import Remainder
+from aqualog.diagnose.run import Options, diagnose
+from aqualog.diagnose.spectrum import weighing
+from aqualog.diagnose.unexplained import unknown_forms
+from aqualog.diagnose.unknown_term import as_term
+from aqualog.model.scenario import Scenario
+from aqualog.model.simulate import assemble
+from aqualog.model.term import Model
+from tests.blind.world.cases import Hidden, Spec, make_case
+from tests.diagnose.test_subsets import hypothesis
+
+MASS, N, DT = 1600.0, 2400, 0.01
+ASKED = tuple(hypothesis(n) for n in ("aero_drag", "payload_mass", "rolling_resistance"))
+
+
+def slow(x, keep):
+    """First-order low-pass of unit variance for white noise of unit variance."""
+    y = np.empty_like(x)
+    y[0] = x[0]
+    for i in range(1, x.size):
+        y[i] = keep * y[i - 1] + np.sqrt(1.0 - keep * keep) * x[i]
+    return y
+
+
+def hump(v):
+    return 250.0 * np.exp(-0.5 * ((v - 22.0) / 2.0) ** 2)
+
+
+def arena(seed, force=None, **effects):
+    """One channel of 240 s with a noise that remembers 1 s; `force` [N] over the coordinates, `effects` by value."""
+    rng = np.random.default_rng(seed)
+    v = 20.0 + 8.0 * np.clip(slow(rng.standard_normal(N), 0.995), -1.8, 1.8)
+    torque = 200.0 + 150.0 * slow(rng.standard_normal(N), 0.98)
+    own = {"t": np.arange(N) * 0.1, "v_x": v, "torque": torque, "position": np.cumsum(v) * 0.1}
+    made = {
+        "aero_drag": -0.6 * v**2 / MASS,
+        "payload_mass": -torque / 0.3 / MASS**2,
+        "rolling_resistance": -9.81 + 0 * v,
+    }
+    y = 0.03 * slow(rng.standard_normal(N), 0.9)
+    y = y + sum(size * made[n] for n, size in effects.items())
+    if force is not None:
+        y = y - force(own) / MASS
+    mask = np.ones(N, dtype=bool)
+    mask[700:800] = False
+    drive = SimpleNamespace(
+        mask=mask, channels=("force_balance",), vehicle=Vehicle(), coordinates=own, dt=DT, used_s=0.1 * mask.sum()
+    )
+    values = {(i, h.free[0]): h.parameter(h.free[0]).neutral for i, h in enumerate(ASKED)}
+    signatures = [[made[h.effect.name][None, None] for h in ASKED]]
+    evidence = make_evidence([drive], ASKED, [y[None]], signatures, values)
+    return arena_of(evidence, [np.full((1, N), -1.0 / MASS)])
+
+
+def test_evidence_is_that_of_the_dense_normal_distribution():
+    rng = np.random.default_rng(1)
+    x, y = rng.standard_normal((5, 40)), rng.standard_normal(40)
+    inner = np.concatenate([x, y[None]]) @ np.concatenate([x, y[None]]).T
+    P = np.array([[2.0, 0.5, 0.0], [0.5, 1.0, 0.2], [0.0, 0.2, 0.7]])
+    block = Block("a", "shape", (0, 1, 2), P, -2.0, 0)
+
+    def dense(columns, scale):
+        S = np.eye(40) + scale**2 * columns.T @ P @ columns
+        return -0.5 * np.linalg.slogdet(S)[1] - 0.5 * y @ np.linalg.solve(S, y) + 0.5 * y @ y
+
+    each = np.array([dense(x[:3], s) for s in (1.0, 3.0)])
+    gained, scale = scored(start(inner), block)
+    assert gained == pytest.approx(float(np.log(np.mean(np.exp(each)))), rel=1e-9)
+    state = added(start(inner), 0, block)
+    assert state.evidence == pytest.approx(gained - 2.0)
+    S = np.eye(40) + scale**2 * x[:3].T @ P @ x[:3]
+    np.testing.assert_allclose(
+        state.inner[3:, 3:], np.array([x[3], x[4], y]) @ np.linalg.solve(S, np.array([x[3], x[4], y]).T)
+    )
+
+
+def test_gains_of_noise_are_those_of_white_noise_once_it_is_weighed():
+    """Without the weighing by the spectrum, slow columns would gain several times that."""
+    gains = []
+    for seed in range(12):
+        rng = np.random.default_rng([5, seed])
+        y = np.array([slow(rng.standard_normal(N), 0.97) + 0.3 * slow(rng.standard_normal(N), 0.5)])
+        w = weighing(y, np.ones(N, dtype=bool), np.eye(1))
+        x = np.array([[np.cos(np.pi * k * (np.arange(N) + 0.5) / N)] for k in (3, 7, 15, 40, 90)])
+        rows = w.rows(np.concatenate([x, y[None]]))
+        gains += [float((r @ rows[-1]) ** 2 / (r @ r)) for r in rows[:-1]]
+    assert 0.5 < np.mean(gains) < 1.7
+
+
+def test_a_hump_in_speed_is_a_force_over_speed():
+    a = arena(1, lambda c: hump(c["v_x"]))
+    p = compete(a)
+    found = unknown_forms(a, p, seed=1)
+    assert [(r.mechanism, r.depends_on, r.channel, r.unit) for r in found] == [
+        ("force", ("v_x",), "force_balance", "N")
+    ]
+    r = found[0]
+    ok = np.isfinite(r.f)
+    truth = hump(r.x[:, 0])
+    assert ok.mean() > 0.8
+    assert np.sqrt(np.mean((r.f - truth)[ok] ** 2)) < 0.3 * np.sqrt(np.mean(truth[ok] ** 2))
+    assert np.mean((r.low <= truth)[ok] & (truth <= r.high)[ok]) > 0.9
+    assert r.probability > 0.95
+    assert 0.1 < r.share < 1.0
+    assert r.nearest in {h.key for h in ASKED}
+    assert "goes with speed" in r.sentence
+    assert unknown_forms(a, p, seed=1)[0].high.tolist() == r.high.tolist()
+
+
+def test_a_place_on_one_pass_may_be_a_moment():
+    patch = lambda c: 1000.0 * ((c["position"] > 1500.0) & (c["position"] < 2500.0))  # noqa: E731
+    a = arena(2, patch)
+    r = unknown_forms(a, compete(a), seed=1)[0]
+    assert r.mechanism == "force"
+    assert r.depends_on in (("position",), ("t",))
+    assert "Without a second pass" in r.sentence
+
+
+def test_a_known_effect_is_no_unknown_form():
+    a = arena(3, aero_drag=0.4)
+    p = compete(a)
+    assert unknown_forms(a, p, seed=1) == ()
+    assert p.marginal["aero_drag"] > 0.95
+    assert {a.blocks[m].key for m in p.best} == {"aero_drag"}
+
+
+@pytest.mark.parametrize("seed", [4, 5, 6])
+def test_nothing_where_there_is_nothing(seed):
+    a = arena(seed)
+    p = compete(a)
+    assert p.best == ()
+    assert unknown_forms(a, p, seed=1) == ()
+    assert p.probability.sum() == pytest.approx(1.0)
+
+
+def test_of_a_long_drive_its_best_stretch_competes(monkeypatch):
+    monkeypatch.setattr("aqualog.diagnose.arena.MOST_BLOCKS", 1000)
+    (part,) = arena(7).parts
+    assert part.residual.shape == (1, 1000)
+    assert part.mask.all()
+
+
+def test_a_hump_of_another_simulator_is_unexplained(monkeypatch):
+    """The whole way from signals to verdict, asked about few known effects."""
+    few = ("aero_drag", "head_wind", "payload_mass", "torque_gain")
+
+    def asked(drives, model):
+        every, untested = hypotheses(drives, model)
+        return tuple(h for h in every if h.allowed or h.effect.name in few), untested
+
+    monkeypatch.setattr(run, "hypotheses", asked)
+    hidden = (Hidden("speed_hump", None, {"force": 300.0, "centre": 20.0, "width": 2.5}),)
+    case = make_case(Spec("mixed", "ou1", hidden, 3, duration_s=150.0, holdout=0))
+    found = diagnose(case.drives, case.vehicle, options=Options(views=False, consequences=False))
+    assert found.verdict == "unexplained"
+    assert (found.remainders[0].mechanism, found.remainders[0].depends_on) == ("force", ("v_x",))
+    assert [t.effect.name for t in found.model.terms] == ["unexplained_force"]
+    assert "a force on the car that goes with speed" in found.sentence
+
+
+def remainder(x, f, half=10.0, mechanism="force", depends_on=("v_x",)):
+    x = np.asarray(x, dtype=float)[:, None]
+    return Remainder(
+        "force_balance", depends_on, 0.3, 0.01, x, f, f - half, f + half, (), None, 0.0, "", mechanism, "N", 0.99
+    )  # fmt: skip
+
+
+def test_a_force_over_speed_becomes_a_term():
+    x = np.linspace(10.0, 35.0, 60)
+    f = np.where(x > 30.0, np.nan, hump(x))
+    term = as_term(remainder(x, f, half=100.0))
+    car = Vehicle(name="car", given=frozenset({"drivetrain", "mass"}))
+    plant = Model((term,)).apply(assemble(Scenario(car, duration_s=2.0))).plant
+    v, ok = np.linspace(10.0, 29.5, 100), x <= 30.0
+    np.testing.assert_allclose(np.interp(v, *plant.drag_over_v.T), np.interp(v, x[ok], f[ok]), atol=0.15 * 100.0 + 1e-6)
+    np.testing.assert_array_equal(np.interp([2.0, 7.9, 32.5, 60.0], *plant.drag_over_v.T), 0.0)
+    assert len(term.knots) < 20
+
+
+def test_a_hole_in_the_support_is_nominal():
+    x = np.linspace(10.0, 35.0, 60)
+    f = np.where((x > 18.0) & (x < 28.0), np.nan, 200.0)
+    knots = as_term(remainder(x, f)).knots
+    assert np.interp([15.0, 23.0, 30.0], *np.array(knots).T) == pytest.approx([200.0, 0.0, 200.0])
+
+
+def test_a_road_becomes_a_term_and_others_do_not():
+    x = np.linspace(0.0, 3000.0, 60)
+    road = as_term(remainder(x, 0.03 * np.sin(x / 300.0), half=0.001, mechanism="road", depends_on=("position",)))
+    assert road.effect.name == "unexplained_grade"
+    assert np.interp(471.0, *np.array(road.knots).T) == pytest.approx(0.03, rel=0.02)
+    assert as_term(remainder(x, 0.0 * x, mechanism="slip_f")) is None
+    assert as_term(remainder(x, 0.0 * x, depends_on=("t",))) is None
+    assert as_term(remainder(np.linspace(5, 40, 60), np.full(60, 1e6))) is None
