@@ -7,8 +7,11 @@ import math
 __all__ = ["SURE", "tempered"]
 
 SURE = 0.95  # probability from which a cause is named
-OFFSET, SLOPE = 0.0, 1.0
-MOST = 0.999
+# Fitted to 227 effects with a share above 0.02, on 131 drives of a second simulator (28 effects twice, 10 pairs of
+# twins, 10 compounds, 9 of a third tyre, 21 unknown forms, 40 with nothing) without those where a form was found.
+# Brier skill 0.58, of the shares themselves 0.53; of 42 effects at 0.95 and above 40 are there. (D)
+OFFSET, SLOPE = -0.87, 0.46
+FARTHEST = 10.0  # of the logit; shares beyond are no more often right
 
 
 def tempered(p: float) -> float:
@@ -18,5 +21,5 @@ def tempered(p: float) -> float:
     right as they say.
     """
     p = min(max(p, 1e-9), 1.0 - 1e-9)
-    z = OFFSET + SLOPE * math.log(p / (1.0 - p))
-    return min(1.0 / (1.0 + math.exp(-z)), MOST)
+    logit = min(max(math.log(p / (1.0 - p)), -FARTHEST), FARTHEST)
+    return 1.0 / (1.0 + math.exp(-OFFSET - SLOPE * logit))

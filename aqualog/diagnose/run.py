@@ -118,14 +118,7 @@ def diagnose(
     outcome = conclude(evidence, found.candidates, model, p_value=found.tests[0].p_value)
     outcome, agreed = _by_drive(evidence, found, outcome, model)
     tell("known effects against unknown forms", 0.8)
-    arena = make_arena(evidence, model)
-    posterior = compete(arena)
-    remainders = unknown_forms(arena, posterior, seed=options.seed)
-    failed = repeats(outcome.chosen, arena, found.noises, model) if outcome.chosen is not None else ()
-    if not remainders:
-        arena = known_only(arena)
-        posterior = compete(arena)
-    outcome = judged(outcome, remainders, arena, posterior, model, failed)
+    outcome, remainders = _competed(evidence, found, outcome, model, options)
     if road is not None:
         outcome = _with_road(outcome, road, named=hilly)
     extended = _extended(outcome, remainders, model if hilly else given, asked)
@@ -161,6 +154,20 @@ def diagnose(
         views=_views(ready, before, after) if options.views else (),
         agreement=agreed if outcome.causes else (),
     )
+
+
+def _competed(
+    evidence: Evidence, found: Found, outcome: Outcome, model: Model, options: Options
+) -> tuple[Outcome, tuple[Remainder, ...]]:
+    """The verdict with probabilities, and the unknown forms: of all that competes, else of known effects alone."""
+    arena = make_arena(evidence, model)
+    posterior = compete(arena)
+    remainders = unknown_forms(arena, posterior, seed=options.seed)
+    failed = repeats(outcome.chosen, arena, found.noises, model) if outcome.chosen is not None else ()
+    if not remainders:
+        arena = known_only(arena)
+        posterior = compete(arena)
+    return judged(outcome, remainders, arena, posterior, model, failed), remainders
 
 
 def _sentence(outcome: Outcome, remainders: tuple[Remainder, ...], found: Found, options: Options) -> str:

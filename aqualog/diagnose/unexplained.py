@@ -30,8 +30,8 @@ DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points
 def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
     """Shapes of the best set that no known effect replaces, what explains most first; empty if none is that clear.
 
-    A mechanism counts if its probability is 0.95, the best set is 5 nats ahead of the best one of known effects, and it
-    explains a fifth of what the set explains and 5 % of a channel's variance.
+    A mechanism counts if its share of the posterior is 0.95, the best set is 5 nats ahead of every set of known
+    effects, and it explains a fifth of what the set explains and 5 % of a channel's variance.
     """
     blocks = arena.blocks
     best = posterior.best
@@ -44,9 +44,9 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     shapes = [m for m in best if blocks[m].kind == "shape"]
     for name in dict.fromkeys(arena.name(m) for m in shapes):
         own = [m for m in shapes if arena.name(m) == name]
-        probability = tempered(posterior.marginal[name])
-        if probability < SURE:
+        if posterior.marginal[name] < SURE:
             continue
+        probability = tempered(posterior.marginal[name])
         # over two coordinates that go together, either could be left out; the mechanism could not
         loss = whole - evidence_of(arena, posterior.tolerant, [m for m in best if m not in own])
         channel, share = _where(arena, own, fit)
