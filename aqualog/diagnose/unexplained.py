@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -110,14 +111,11 @@ def _described(
     }
     alike = sorted({n for c, q in others.items() if q >= ALIKE * posterior.blocks[m] for n in c} - set(s.coordinates))
     nearest, cosine = _nearest(arena, posterior.gram, m, fit.mean[own])
-    sentence = describe(
-        s.mechanism, s.coordinates, s.basis.points, f, f - half, f + half,
-        probability=probability, channel=channel, share=share, alike=alike, nearest=nearest, cosine=cosine,
-    )  # fmt: skip
-    return Remainder(
+    found = Remainder(
         channel, s.coordinates, share, math.nan, s.basis.points, f, f - half, f + half, tuple(alike), nearest, cosine,
-        sentence, s.mechanism.name, s.mechanism.unit, probability,
+        "", s.mechanism.name, s.mechanism.unit, probability,
     )  # fmt: skip
+    return replace(found, sentence=describe(s.mechanism, found))
 
 
 def _band(at: FloatArray, covariance: FloatArray, supported: BoolArray, seed: int) -> FloatArray:

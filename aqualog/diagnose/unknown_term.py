@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from aqualog.core.records import FloatArray
@@ -117,31 +115,25 @@ _CHANNELS: dict[str, tuple[str, str]] = {
 ALIKE = 0.9  # cosine from which a known effect looks nearly the same
 
 
-def describe(
-    mechanism: Mechanism, names: Sequence[str], x: FloatArray, f: FloatArray, low: FloatArray, high: FloatArray, *,
-    probability: float, channel: str, share: float, alike: Sequence[str], nearest: str | None, cosine: float,
-) -> str:  # fmt: skip
-    """Sentences: mechanism and coordinate, its largest value, coordinates that explain it as well, similar effects.
-
-    `x` (k, d), `f`, `low`, `high` (k,) as in a `Remainder`: NaN where the drive was not.
-    """
-    title = _CHANNELS.get(channel, (channel, "?"))[0]
-    of = " and ".join(_word(n) for n in names)
-    text = f"Unexplained: {mechanism.title} goes with {of} (probability {probability:.2f}"
-    text += f"; {share:.0%} of the variance of the {title}"
-    sure = np.isfinite(f) & ((low > 0.0) | (high < 0.0))
+def describe(mechanism: Mechanism, r: Remainder) -> str:
+    """Sentences: mechanism and coordinate, its largest value, coordinates that explain it as well, similar effects."""
+    title = _CHANNELS.get(r.channel, (r.channel, "?"))[0]
+    of = " and ".join(_word(n) for n in r.depends_on)
+    text = f"Unexplained: {mechanism.title} goes with {of} (probability {r.probability:.2f}"
+    text += f"; {r.share:.0%} of the variance of the {title}"
+    sure = np.isfinite(r.f) & ((r.low > 0.0) | (r.high < 0.0))
     if sure.any():
-        at = int(np.argmax(np.where(sure, np.abs(f), -1.0)))
-        there = ", ".join(f"{v:.4g} {_unit(n)}".removesuffix(" -") for n, v in zip(names, x[at], strict=True))
-        text += f"; {quantity(float(f[at]), mechanism.unit, change=True)} at {there}"
+        at = int(np.argmax(np.where(sure, np.abs(r.f), -1.0)))
+        there = ", ".join(f"{v:.4g} {_unit(n)}".removesuffix(" -") for n, v in zip(r.depends_on, r.x[at], strict=True))
+        text += f"; {quantity(float(r.f[at]), mechanism.unit, change=True)} at {there}"
     text += ")."
-    if alike:
-        text += f" This drive cannot distinguish it from {_list(list(alike))}."
-    if {"t", "position"} & set(names):
+    if r.proxies:
+        text += f" This drive cannot distinguish it from {_list(r.proxies)}."
+    if {"t", "position"} & set(r.depends_on):
         text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."
-    if nearest is not None:
-        same = "looks nearly the same" if cosine >= ALIKE else "is the nearest known effect"
-        text += f" {nearest} {same} (similarity {cosine:.2f} of 1)."
+    if r.nearest is not None:
+        same = "looks nearly the same" if r.cosine >= ALIKE else "is the nearest known effect"
+        text += f" {r.nearest} {same} (similarity {r.cosine:.2f} of 1)."
     return text
 
 
