@@ -93,8 +93,8 @@ def calibrate(
     """Null distribution of the largest gain.
 
     Noise alone makes the columns' inner products with the residual Gaussian. Their covariance follows from the columns
-    and from the smoothed cross spectrum of what the autoregression leaves of the noise. So a surrogate is one draw of
-    normal numbers, as many as there are columns.
+    and from the smoothed cross spectrum of what the autoregression leaves of the noise. So a surrogate [theiler1992] is
+    one draw of normal numbers, as many as there are columns.
 
     Parameters
     ----------
