@@ -12,7 +12,7 @@ PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
 MOST_LINES = 85_000  # of the package: 77,720 before the verdict, the checks of inputs and `init`; 60,000 is the goal
-MOST_FILES = 450
+MOST_FILES = 456
 MOST_TEST_LINES = 64_000
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500

@@ -1,4 +1,4 @@
-"""Coloured noise of residual channels: an autoregression with a long memory, whitening, and surrogates.
+"""Coloured noise of residual channels: an autoregression with a long memory, and whitening.
 
 Sensors drift, wind gusts, roads are rough: residuals are correlated over time. A test that treats their samples as
 independent finds an effect in every log. The channels are combined so that they share little noise, each combination
@@ -16,7 +16,7 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = [
-    "MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "good_size", "spectra", "surrogate",
+    "MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "good_size", "spectra",
     "white_noise", "whitened",
 ]  # fmt: skip
 
@@ -220,32 +220,3 @@ def whitened(x: Spectra, noise: Noise) -> FloatArray:
         e = np.fft.irfft(z, x.size)[:, MEMORY : MEMORY + x.n]
         out[i] = noise.shaping @ (e * noise.weights)
     return out.reshape(k, out.shape[1] * x.n)
-
-
-def surrogate(residual: FloatArray, mask: BoolArray, rng: np.random.Generator) -> FloatArray:
-    """A residual without effects that has the spectra and cross spectra of this one: Gaussian, locally smoothed.
-
-    Each frequency is a random mixture of its neighbours, the same for all channels; the constant is a mixture of the
-    lowest ones. This spreads peaks that an effect leaves at single frequencies, and gaps that a fitted effect has left.
-    """
-    x = bridged(residual, mask)
-    n = x.shape[-1]
-    mean = x[:, mask].mean(axis=1, keepdims=True)
-    f = np.fft.rfft(x - mean, axis=-1)
-    m = f.shape[-1]
-    k = np.arange(m)
-    out = np.zeros_like(f)
-    width = np.maximum(3, (0.12 * k).astype(np.intp))
-    width = np.minimum(width, 40)
-    power = np.zeros(m)
-    for d in range(-40, 41):
-        near = np.abs(d) <= width
-        j = np.abs(k + d)
-        j = np.where(j >= m, 2 * (m - 1) - j, j)
-        near &= j > 0
-        z = (rng.standard_normal(m) + 1j * rng.standard_normal(m)) * np.sqrt(0.5)
-        out += np.where(near, z * f[:, j], 0.0)
-        power += near
-    out /= np.sqrt(np.maximum(power, 1.0))
-    out[:, 0] = np.real(out[:, 0]) * np.sqrt(2.0)
-    return np.asarray(np.fft.irfft(out, n, axis=-1))

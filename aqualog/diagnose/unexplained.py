@@ -19,7 +19,7 @@ from aqualog.diagnose.unknown_term import describe
 
 __all__ = ["evidence_of", "unknown_forms"]
 
-AHEAD = 5.0  # [nats] that the best set must be ahead of the best one without unknown shapes
+AHEAD = 5.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
 WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
 LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what it explains, by the channel's unit
@@ -31,7 +31,7 @@ DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points
 def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
     """Shapes of the best set that no known effect replaces, what explains most first; empty if none is that clear.
 
-    A mechanism counts if its share of the posterior is 0.95, the best set is 5 nats ahead of every set of known
+    A mechanism counts if its share of the posterior is 0.95, the best set is e^5 times as likely as every set of known
     effects, and it explains a fifth of what the set explains and 5 % of a channel's variance.
     """
     blocks = arena.blocks
@@ -58,7 +58,7 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
 
 
 def evidence_of(arena: Arena, tolerant: FloatArray, members: Sequence[int]) -> float:
-    """Log of the marginal likelihood that a set gains, without its prior. [nats]"""
+    """Log of the marginal likelihood that a set gains, without its prior. [nats (natural logarithm)]"""
     state, total = start(tolerant), 0.0
     for m in members:
         total += scored(state, arena.blocks[m])[0]
@@ -72,7 +72,7 @@ def _own(arena: Arena, m: int, fit: Fitted) -> list[int]:
 
 
 def _where(arena: Arena, members: Sequence[int], fit: Fitted) -> tuple[str | None, float]:
-    """The channel of whose variance shapes explain most, and that share; None if it is not worth telling anywhere."""
+    """The channel of whose variance shapes explain most, and that share; None if it is not worth reporting anywhere."""
     before, after, made = [], [], []
     for i, p in enumerate(arena.parts):
         f = sum(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aqualog.diagnose.noise import MEMORY, bridged, fit_noise, for_mask, spectra, surrogate, whitened
+from aqualog.diagnose.noise import MEMORY, bridged, fit_noise, for_mask, spectra, whitened
 
 N = 6000
 
@@ -133,22 +133,3 @@ def bands(x, y):
     """Cross spectrum in five bands."""
     f = np.fft.rfft(x - x.mean()) * np.conj(np.fft.rfft(y - y.mean()))
     return np.array([b.real.sum() for b in np.array_split(f[1:], [30, 150, 600, 1500])])
-
-
-def test_surrogates_have_the_spectra_and_cross_spectra():
-    x = coloured(11)
-    mask = np.ones(N, dtype=bool)
-    drawn = [surrogate(x, mask, np.random.default_rng(s)) for s in range(60)]
-    for i, j in ((0, 0), (1, 1), (2, 2), (1, 2)):
-        mean = np.mean([bands(d[i], d[j]) for d in drawn], axis=0)
-        np.testing.assert_allclose(mean[1:], bands(x[i], x[j])[1:], rtol=0.25)
-        assert mean[0] == pytest.approx(bands(x[i], x[j])[0], rel=0.5)
-
-
-def test_surrogates_are_drawn_by_the_seed_and_unlike_what_they_come_from():
-    x = coloured(12)
-    mask = np.ones(N, dtype=bool)
-    a, b, c = (surrogate(x, mask, np.random.default_rng(s)) for s in (1, 1, 2))
-    assert np.array_equal(a, b)
-    assert abs(np.corrcoef(a[1], c[1])[0, 1]) < 0.15
-    assert abs(np.corrcoef(a[1], x[1])[0, 1]) < 0.15
