@@ -43,7 +43,7 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Inner products (K + 1, K + 1) beside a set, the residual last, and the evidence of the set [nats (natural logarithm)]."""
+    """Inner products (K + 1, K + 1) beside a set, the residual last; its evidence [nats (natural logarithm)]."""
 
     inner: FloatArray
     members: tuple[int, ...] = ()
