@@ -1,0 +1,460 @@
+"""What repeats with every turn of a wheel, at the log's own rate: rings, wheels and tyres that are uneven.
+
+Blocks of 0.1 s hold one to two turns, so the residuals of the search show nothing of it. Here each wheel speed is
+compared with its own mean over a second, over the wheel's own angle. Orders next to a whole one are the null: they have
+the noise of the same frequencies, whatever its colour.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from aqualog.core.intervals import chi2_log_p
+from aqualog.core.notation import AXLES, SIDES, WHEELS
+from aqualog.core.records import BoolArray, FloatArray, Origin, Signals
+from aqualog.core.units import is_unit, parse_unit
+from aqualog.core.vehicle import Vehicle
+from aqualog.diagnose.inputs import SPEED_S, smooth
+from aqualog.diagnose.records import Cause, Estimate
+from aqualog.diagnose.words import cause_sentence, place
+from aqualog.model.effects import EFFECTS
+
+__all__ = ["LEVEL", "ORDERS", "PerTurn", "per_turn", "remarks", "to_causes", "wheel_columns"]
+
+ORDERS = (1, 2, 3)
+LEVEL = 0.01  # false alarms per drive, over all wheels and orders
+POWER_Z = 1.2816  # [sd] for a power of 0.9
+Z = 1.959964  # 97.5 % quantile of the normal distribution
+LEAST_HZ = 2.0  # slower, the driver and the springs move the car: the mean over a second ends there
+NYQUIST = 0.8  # share of the highest frequency that a rate can show
+LEAST_TURNS = 100
+GAP_S = 0.25  # [s] of missing samples that a straight line may bridge, as in `drive`
+OUTLIER = 6.0  # [sd] of the local scatter
+BINS = 8  # of a turn: an order 0.15 off turns by 0.06 rad within half a bin
+FINER = 4  # points of the transform per block's own resolution, where the order is sought
+BLOCKS = (512, 64, 16)  # [turns] beside the whole drive: the noise of a wheel speed makes the angle drift
+GUARD, NULL = 0.03, 0.17  # nearest and farthest order of the null
+ORDER_SLACK = 0.05  # of the order, where a control unit has turned the angle into a speed with a radius of its own
+UNEQUAL, UNEQUAL_LOG_P = 1.6, 3.0  # ratio of amplitudes at low and high speed, and how sure it must be
+LEAST_CHANGES, IN_STEP, MOST_HELD = 50, 0.97, 25
+
+Kind = Literal["ring", "speed", "nothing", "untested"]
+
+
+@dataclass(frozen=True, slots=True)
+class PerTurn:
+    """What one wheel's speed has of one order: `amplitude` relative to the speed, with its 95 % interval.
+
+    `p_value`: of so much by chance anywhere in the drive, over all wheels and orders. `limit`: smallest amplitude that
+    is found with a power of 0.9. `speed` [m/s]: lowest and highest that were used; `used_s` [s]. `turns_gain`: turns
+    by the log's wheel speed over real turns, where a control unit's own radius has made speeds of them; else 1.
+    `kind`: `ring` if the relative amplitude is the same at low and high speed, `speed` if not; `untested` with the
+    `reason`.
+    """
+
+    wheel: str
+    order: int
+    kind: Kind
+    amplitude: float = math.nan
+    low: float = math.nan
+    high: float = math.nan
+    p_value: float = 1.0
+    limit: float = math.nan
+    speed: tuple[float, float] = (math.nan, math.nan)
+    used_s: float = 0.0
+    turns_gain: float = math.nan
+    reason: str = ""
+
+    @property
+    def found(self) -> bool:
+        """Whether it is there, at `LEVEL`."""
+        return self.kind in ("ring", "speed")
+
+
+class _Wheel(NamedTuple):
+    """A wheel speed at its own step: mean and relative rest (m,), weight 1 / variance of the rest, angle [turns].
+
+    `rate` [Hz]: at which the bus has it; `lines`: time between samples that straight lines connect, else 0. [s]
+    `rounding` (m,): share of that variance that comes from the steps of the signal.
+    """
+
+    dt: float
+    rate: float
+    lines: float
+    mean: FloatArray
+    rest: FloatArray
+    weight: FloatArray
+    turns: FloatArray
+    rounding: FloatArray
+
+
+class _Sum(NamedTuple):
+    """Sums over blocks of turns: weight (b,), transforms (b, j) at the orders `offset` (j,) beside the whole one.
+
+    `speed` (b,): mean [rad/s]; `rounding`: noise that the steps of the signal would make, in units of `weight`.
+    """
+
+    weight: FloatArray
+    transform: np.ndarray[tuple[int, int], np.dtype[np.complex128]]
+    offset: FloatArray
+    speed: FloatArray
+    rounding: float
+    finer: int
+
+
+class _Fit(NamedTuple):
+    log_p: float
+    square: float  # of the amplitude
+    sd: float  # of the square
+    noise: float
+    tries: int
+    sums: _Sum
+    at: int
+
+
+def wheel_columns(signals: Signals) -> dict[str, FloatArray]:
+    """Wheel speeds of a log at its own rate, NaN where a sample is missing. (n,) each [rad/s]"""
+    return {f"omega_{w}": signals.array(f"omega_{w}") for w in WHEELS if f"omega_{w}" in signals.symbols}
+
+
+def per_turn(
+    columns: Mapping[str, FloatArray],
+    dt: float,
+    vehicle: Vehicle,
+    origins: Mapping[str, Origin],
+    *,
+    window_s: float | None = None,
+) -> tuple[PerTurn, ...]:
+    """What repeats with every turn of each wheel, and with every half and third of a turn.
+
+    Parameters
+    ----------
+    columns : mapping of array (n,)
+        `omega_*` [rad/s], not averaged; NaN where a sample is missing.
+    dt : float
+        [s]
+    vehicle : Vehicle
+        Its radii turn wheel speeds into the speeds of the answer.
+    origins : mapping of Origin
+        Rate of each signal on its bus, and its unit.
+    window_s : float, optional
+        Time over which the control unit averages a wheel speed. None: unknown, between nothing and the period of its
+        reports; the interval covers both. [s]
+
+    Returns
+    -------
+    found : tuple of PerTurn
+        One for each wheel in the log and each order.
+
+    The angle is the integral of the wheel speed itself, so delays do not matter. Its noise makes the angle drift: sums
+    over the whole drive and over 512, 64 and 16 turns compete. Limits: a tyre that runs out of true looks like a ring;
+    a speed that is rounded without noise hides what is smaller than half a step.
+    """
+    wheels = [w for w in WHEELS if f"omega_{w}" in columns]
+    raw = [_of_order(columns[f"omega_{w}"], dt, origins.get(f"omega_{w}"), window_s) for w in wheels]
+    tests = sum(not isinstance(r, str) for of in raw for r in of)
+    out = []
+    for w, of in zip(wheels, raw, strict=True):
+        for order, r in zip(ORDERS, of, strict=True):
+            if isinstance(r, str):
+                out.append(PerTurn(w, order, "untested", reason=r))
+                continue
+            p = min(1.0, r.p_value * tests)
+            kind: Kind = r.kind if p <= LEVEL else "nothing"
+            low, high = (x * vehicle.r_e(w) for x in r.speed)
+            reason = r.reason if kind == "speed" else ""
+            out.append(replace(
+                r, wheel=w, order=order, kind=kind, p_value=p, speed=(low, high), reason=reason,
+                limit=r.limit * _stricter(tests),
+            ))  # fmt: skip
+    return tuple(out)
+
+
+def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
+    """What is found once per turn as causes `tone_ring`, those of an axle or a side with one value together.
+
+    Larger than the effect's smallest size only; `remarks` has the rest.
+    """
+    effect = EFFECTS["tone_ring"]
+    smallest = effect.parameters[0].smallest
+    rings = {f.wheel: f for f in found if f.order == 1 and f.kind == "ring" and f.amplitude >= smallest}
+    out = []
+    for where, wheels in (*AXLES.items(), *SIDES.items()):
+        pair = [rings[w] for w in wheels if w in rings]
+        if len(pair) == 2 and max(f.low for f in pair) <= min(f.high for f in pair):
+            out.append((where, pair))
+            for w in wheels:
+                del rings[w]
+    out += [(w, [f]) for w, f in rings.items()]
+    causes = []
+    for where, pair in out:
+        mean = float(np.mean([f.amplitude for f in pair]))
+        half = 0.5 * math.sqrt(sum((f.high - f.low) ** 2 for f in pair)) / len(pair)
+        value = Estimate(mean, max(mean - half, 0.0), mean + half, effect.parameters[0].unit)
+        parameters = {effect.parameters[0].name: value}
+        channels = tuple(f"omega_{f.wheel}" for f in pair)
+        causes.append(Cause(effect.name, where, parameters, channels, cause_sentence(effect, where, parameters)))
+    return tuple(causes)
+
+
+def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
+    """Sentences about what is found and is no cause, and about what the log cannot show."""
+    smallest = EFFECTS["tone_ring"].parameters[0].smallest
+    out = []
+    for f in found:
+        if not f.found:
+            continue
+        often = {1: "once", 2: "twice"}.get(f.order, f"{f.order} times")
+        what = f"The wheel speed{place(f.wheel)} varies {often} per turn by {f.amplitude:.2%}"
+        if f.kind == "speed":
+            out.append(f"{what}; {f.reason}: a resonance or the tyre, not the tone ring.")
+        elif f.order > 1:
+            out.append(f"{what} at all speeds: the tyre or the pick-up, not an eccentric ring.")
+        elif f.amplitude < smallest:
+            out.append(f"Significant, but too small to be worth naming: {what[0].lower()}{what[1:]}.")
+    untested = {f.reason for f in found if f.kind == "untested" and f.order == 1}
+    if any(f.order == 1 and f.kind == "ring" for f in found):
+        out.append("A tyre or rim that runs out of true, by its share of the radius, looks like an uneven tone ring.")
+    return (*out, *(f"Unevenness of the wheels' tone rings is not tested: {r}." for r in sorted(untested)))
+
+
+def _of_order(x: FloatArray, dt: float, origin: Origin | None, window_s: float | None) -> list[PerTurn | str]:
+    """Each order of one wheel, with speeds in rad/s and p-values of its own; or why it is not tested."""
+    wheel = _prepared(x, dt, origin)
+    if isinstance(wheel, str):
+        return [wheel] * len(ORDERS)
+    has_speed = origin is not None and is_unit(origin.unit) and parse_unit(origin.unit).dimension == "speed"
+    return [_tested(wheel, order, window_s, ORDER_SLACK if has_speed else 0.0) for order in ORDERS]
+
+
+def _prepared(x: FloatArray, dt: float, origin: Origin | None) -> _Wheel | str:
+    held = _held(x)
+    if held > 1:
+        changes = np.flatnonzero(np.diff(x) != 0.0) + 1
+        first = int(np.bincount(changes % held, minlength=held).argmax())
+        x, dt = x[first::held], held * dt
+    rate = 1.0 / dt
+    lines = 0.0
+    if origin is not None and 0.0 < origin.rate_hz < 0.8 * rate:
+        rate = origin.rate_hz
+        lines = 1.0 / rate
+    good = np.isfinite(x)
+    if good.sum() * dt < 2.0 * SPEED_S or 0.5 * NYQUIST * rate <= LEAST_HZ:
+        return f"the wheel speeds come at {rate:.3g} Hz" if good.any() else "no wheel speed"
+    missing = _long_gaps(good, dt)
+    filled = np.interp(np.arange(x.size), np.flatnonzero(good), x[good])
+    mean = smooth(filled, dt, SPEED_S)
+    scatter, step = _scatter(filled - mean, dt), _step(x)
+    good &= np.abs(filled - mean) <= OUTLIER * np.maximum(scatter, step)
+    filled = np.where(good | missing, filled, mean)  # outliers would turn the angle
+    mean = smooth(filled, dt, SPEED_S)
+    rounding = step**2 / 12.0
+    variance = np.maximum(_scatter(filled - mean, dt) ** 2, max(rounding, 1e-12))
+    turns = np.concatenate(([0.0], np.cumsum(0.5 * dt * (filled[1:] + filled[:-1])))) / (2.0 * math.pi)
+    safe = np.maximum(mean, 1e-3)
+    beside = round(0.5 * SPEED_S / dt)
+    edge = np.convolve(np.pad(missing, beside, constant_values=True), np.ones(2 * beside + 1), "valid") > 0.5
+    weight = np.where(good & ~edge & (mean > 1e-3), safe**2 / variance, 0.0)
+    return _Wheel(dt, rate, lines, mean, (filled - mean) / safe, weight, turns, rounding / variance)
+
+
+def _tested(wheel: _Wheel, order: int, window_s: float | None, slack: float) -> PerTurn | str:
+    f = order * wheel.mean / (2.0 * math.pi)
+    used = (wheel.weight > 0.0) & (f > LEAST_HZ) & (f < 0.5 * NYQUIST * wheel.rate)
+    if not used.any():
+        if not ((wheel.weight > 0.0) & (f > LEAST_HZ)).any():
+            return f"no wheel turns faster than {LEAST_HZ:g} times a second"
+        return f"wheel speeds at {wheel.rate:.3g} Hz are too slow for one turn of a wheel at the speeds of the drive"
+    part = _Wheel(wheel.dt, wheel.rate, wheel.lines, *(a[used] for a in wheel[3:]))
+    f = f[used]
+    # share of the amplitude that is left: no window or the whole period of the reports, and what the mean took
+    period = max(1.0 / wheel.rate, wheel.dt)
+    fixed = (1.0 - _hann_gain(f, wheel.dt)) * np.sinc(f * wheel.lines) ** 2
+    least = fixed * np.sinc(f * (period if window_s is None else window_s))
+    most = fixed if window_s is None else least
+    gain = 0.5 * (least + most)
+    best = _best(part, order, gain, slack)
+    if isinstance(best, str):
+        return best
+    sums = best.sums
+    total = float(sums.weight.sum())
+    w = part.weight * gain
+    by_most, by_least = (float(w @ g) / float(w @ gain) for g in (most, least))
+    low = math.sqrt(max(best.square - Z * best.sd, 0.0)) / by_most
+    high = math.sqrt(max(best.square + Z * best.sd, 0.0)) / by_least
+    log_p = best.log_p - math.log10(best.tries)
+    needed = math.sqrt(2.0 * math.log(best.tries / LEVEL)) + POWER_Z
+    unlike = _speed_dependence(part, order, gain, best)
+    return PerTurn(
+        "", order, "speed" if unlike else "ring", math.sqrt(max(best.square, 0.0)), low, high,
+        min(1.0, 10.0**-log_p), needed * math.sqrt(2.0 * best.noise / total),
+        (float(part.mean.min()), float(part.mean.max())), float(used.sum() * wheel.dt),
+        order / (order + float(sums.offset[best.at])), unlike,
+    )  # fmt: skip
+
+
+def _best(part: _Wheel, order: int, gain: FloatArray, slack: float) -> _Fit | str:
+    """The surest of the sums over the whole drive and over blocks of it, at the surest order within `slack`."""
+    place_of = np.floor((part.turns - part.turns[0]) * BINS).astype(np.intp)
+    turns = int(place_of[-1] // BINS) + 1
+    filled = np.unique(place_of // BINS).size
+    if filled < LEAST_TURNS:
+        return f"{filled} turns at usable speeds, {LEAST_TURNS} are needed"
+    fits = []
+    for length in (turns, *(b for b in BLOCKS if 2 * b <= turns)):
+        sums = _summed(part, order, gain, place_of, length, FINER if slack else 1)
+        fit = _fitted(sums, order * slack)
+        if fit is not None:
+            fits.append(fit)
+    if not fits:
+        return "too few turns"
+    best = max(fits, key=lambda f: f.log_p - math.log10(f.tries))
+    # an angle that drifts takes amplitude from long sums: the longest one that loses nothing gives the value
+    size = next(
+        f for i, f in enumerate(fits) if f.square >= max((s.square - 0.5 * s.sd for s in fits[i + 1 :]), default=0.0)
+    )
+    return best._replace(tries=best.tries * len(fits), square=size.square, sd=size.sd)
+
+
+def _summed(
+    part: _Wheel,
+    order: int,
+    gain: FloatArray,
+    place_of: np.ndarray[tuple[int], np.dtype[np.intp]],
+    length: int,
+    finer: int,
+) -> _Sum:
+    """Sums over blocks of `length` turns; the transform over the bins of a block gives the orders beside the whole."""
+    blocks = int(place_of[-1] // (BINS * length)) + 1
+    size = blocks * length * BINS
+    w = part.weight * gain
+    z = w * part.rest * np.exp(-2j * math.pi * order * part.turns)
+    bins = np.bincount(place_of, z.real, size) + 1j * np.bincount(place_of, z.imag, size)
+    block = place_of // (BINS * length)
+    weight = np.bincount(block, w * gain, blocks)
+    rounding = np.bincount(block, w * gain * part.rounding, blocks)
+    speed = np.bincount(block, w * gain * part.mean, blocks)
+    k = math.ceil((NULL + order * ORDER_SLACK) * length * finer) + 1
+    transform = np.fft.fft(bins.reshape(blocks, length * BINS), length * BINS * finer, axis=1)
+    near = np.concatenate([transform[:, -k:], transform[:, : k + 1]], axis=1)
+    full = weight > 0.02 * weight.max()
+    step = float(rounding[full].sum() / weight[full].sum())
+    return _Sum(
+        weight[full], near[full], np.arange(-k, k + 1) / (length * finer), speed[full] / weight[full], step, finer
+    )
+
+
+def _fitted(sums: _Sum, slack: float) -> _Fit | None:
+    """F-type test [fisher1925]: power at the order over the mean power at its neighbours."""
+    count = sums.weight.size
+    each = np.abs(sums.transform) ** 2 / sums.weight[:, None]
+    power = each.sum(axis=0)
+    off = np.abs(sums.offset)
+    beside = each[:, (off >= GUARD + slack) & (off <= NULL + slack)]
+    null = beside.sum(axis=0)
+    if null.size < 4:
+        return None
+    noise = max(float(null.mean()) / count, sums.rounding)
+    # unequal noise of the blocks: fewer degrees of freedom than their number
+    wider = max(1.0, 0.5 * float((beside**2).mean()) / max(float(beside.mean()), 1e-300) ** 2)
+    at = np.flatnonzero(off <= slack + 1e-9)
+    best = int(at[np.argmax(power[at])])
+    ratio = float(power[best]) / noise
+    below = null.size / sums.finer * count / wider
+    x = below * math.log1p(ratio / wider / below)  # exact for one block
+    log_p = chi2_log_p(2.0 * x, max(2, round(2.0 * count / wider)))
+    total = float(sums.weight.sum())
+    square = 4.0 / total * (float(power[best]) - count * noise)
+    sd = 4.0 / total * math.sqrt(wider * (count * noise**2 + 0.5 * noise * total * max(square, 0.0)))
+    return _Fit(log_p, square, sd, noise * wider, max(1, at.size // 2), sums, best)
+
+
+def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) -> str:
+    """How the amplitude differs between thirds of the drive by speed; empty if it does not."""
+    place_of = np.floor((part.turns - part.turns[0]) * BINS).astype(np.intp)
+    sums = _summed(part, order, gain, place_of, BLOCKS[-1], best.sums.finer)
+    at = int(np.argmin(np.abs(sums.offset - best.sums.offset[best.at])))
+    by_speed = np.argsort(sums.speed, kind="stable")
+    share = np.cumsum(sums.weight[by_speed]) / sums.weight.sum()
+    thirds = [by_speed[(share > a) & (share <= b + 1e-12)] for a, b in ((0.0, 1 / 3), (1 / 3, 2 / 3), (2 / 3, 1.0))]
+    if min(t.size for t in thirds) < 2:
+        return ""
+    squares, sds, speeds = [], [], []
+    for third in thirds:
+        weight = sums.weight[third]
+        power = (np.abs(sums.transform[third]) ** 2 / weight[:, None]).sum(axis=0)
+        null = power[(np.abs(sums.offset) >= GUARD + ORDER_SLACK) & (np.abs(sums.offset) <= NULL + ORDER_SLACK)]
+        noise, total = max(float(null.mean()) / third.size, sums.rounding), float(weight.sum())
+        squares.append(max(4.0 / total * (float(power[at]) - third.size * noise), 0.0))
+        sds.append(4.0 / total * math.sqrt(third.size * noise**2 + 0.5 * noise * total * squares[-1]))
+        speeds.append(float(weight @ sums.speed[third]) / total)
+    square, sd = np.array(squares), np.array(sds)
+    middle = float((square / sd**2).sum() / (1.0 / sd**2).sum())
+    log_p = chi2_log_p(float((((square - middle) / sd) ** 2).sum()), 2)
+    low, high = int(np.argmin(square)), int(np.argmax(square))
+    if log_p < UNEQUAL_LOG_P or square[high] < UNEQUAL**2 * square[low]:
+        return ""
+    return (
+        f"{math.sqrt(square[high]):.2%} at {speeds[high] / (2.0 * math.pi):.1f} turns a second and "
+        f"{math.sqrt(square[low]):.2%} at {speeds[low] / (2.0 * math.pi):.1f}"
+    )
+
+
+def _stricter(tests: int) -> float:
+    """How much larger the limit is when so many tests share the level."""
+    one = math.sqrt(-2.0 * math.log(LEVEL)) + POWER_Z
+    return (math.sqrt(-2.0 * math.log(LEVEL / max(tests, 1))) + POWER_Z) / one
+
+
+def _held(x: FloatArray) -> int:
+    """For how many samples a value is repeated: a slow bus on a fast grid; 1 if it is not."""
+    changes = np.flatnonzero(np.diff(np.nan_to_num(x, nan=0.0)) != 0.0) + 1
+    if changes.size < LEAST_CHANGES:
+        return 1
+    for h in range(MOST_HELD, 1, -1):
+        if np.bincount(changes % h, minlength=h).max() >= IN_STEP * changes.size:
+            return h
+    return 1
+
+
+def _long_gaps(good: BoolArray, dt: float) -> BoolArray:
+    """Missing samples of stretches longer than a straight line may bridge."""
+    out = np.zeros(good.size, dtype=bool)
+    edge = np.flatnonzero(np.diff(np.concatenate([[0], (~good).astype(np.int8), [0]])))
+    for a, b in zip(edge[::2], edge[1::2], strict=True):
+        out[a:b] = (b - a) * dt > GAP_S
+    return out
+
+
+def _scatter(rest: FloatArray, dt: float) -> FloatArray:
+    """Robust standard deviation over blocks of a second, smoothed over three: (m,)."""
+    k = max(4, round(1.0 / dt))
+    m = max(rest.size // k, 1)
+    blocks = rest[: m * k].reshape(m, -1) if rest.size >= k else rest[None]
+    sd = np.median(np.abs(blocks), axis=1) / 0.6745
+    sd = np.maximum(sd, 0.25 * np.median(sd))
+    sd = np.convolve(np.pad(sd, 1, mode="edge"), np.ones(3) / 3.0, "valid")
+    return np.asarray(np.interp(np.arange(rest.size), (np.arange(m) + 0.5) * k, sd))
+
+
+def _step(x: FloatArray) -> float:
+    """Step of a quantised signal; next to nothing of one that is not."""
+    change = np.abs(np.diff(x))
+    change = change[np.isfinite(change) & (change > 1e-9)]
+    return float(np.quantile(change, 0.01)) if change.size else 0.0
+
+
+def _hann_gain(f: FloatArray, dt: float) -> FloatArray:
+    """Gain of the mean over a second at frequencies (m,) [Hz], as `smooth` takes it."""
+    k = round(SPEED_S / dt) | 1
+    window = np.hanning(k + 2)[1:-1]
+    window /= window.sum()
+    grid = np.linspace(0.0, 0.5 / dt, 400)
+    at = (np.arange(k) - k // 2) * dt
+    gain = np.cos(2.0 * math.pi * np.outer(grid, at)) @ window
+    return np.asarray(np.interp(f, grid, gain))
