@@ -1,0 +1,307 @@
+"""Places where the clock of one signal jumps against the others: a logger's seam, samples lost without a gap in time.
+
+Accelerometer, wheels, reference velocity and torque all show the car's acceleration. Over some seconds the delay of one
+against another is measured; a step of it that stays is a seam. A gear shift is over within its window, and a clock that
+drifts makes a ramp.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import FloatArray, Signals
+from aqualog.core.vehicle import Vehicle
+from aqualog.diagnose.any_effect import gumbel_p
+from aqualog.diagnose.inputs import smooth
+
+__all__ = ["SEAM_LEVEL", "Seam", "seams"]
+
+SEAM_LEVEL = 0.01  # false alarms per drive, over all pairs of sources
+STEP_S = 0.02  # [s] of the comparison
+FAST_S, SLOW_S = 0.3, 4.0  # [s] means between which the motion is compared: noise is faster, offsets and hills slower
+WINDOW_S, BLOCK_S = 6.0, 0.5
+FARTHEST_S = 1.0  # [s] of a jump to either side
+ALIKE = 0.7  # correlation that a window needs: less shows no delay
+LEAST_MOTION = 0.05  # [m/s²] rms in a window
+LEAST_WINDOWS = 12
+SIDE = 3  # windows before and after a step
+LEAST_S = 0.05  # [s] smallest step that counts as a jump: the tyre's own delay changes by 0.04 with the driving
+DRAWS, TOGETHER = 199, 3  # permutations, and neighbours that stay together in them
+CLIP = 3.0  # [sd] of a window's delay
+NEAR_S = 5.0 * WINDOW_S  # [s] within which steps of several pairs are one seam
+
+
+@dataclass(frozen=True, slots=True)
+class Seam:
+    """A jump of a signal's clock at `t` [s]: from there on it comes `size` [s] later; earlier if negative.
+
+    `signals`: the one that jumps; two where no third one tells which. `p_value`: of such a step by chance anywhere in
+    the drive.
+    """
+
+    t: float
+    size: float
+    signals: tuple[str, ...]
+    p_value: float
+
+    @property
+    def sentence(self) -> str:
+        """In one sentence."""
+        what = f"{abs(self.size):.2f} s {'later' if self.size > 0.0 else 'earlier'}"
+        if len(self.signals) > 1:
+            return (
+                f"From {self.t:.0f} s on, {self.signals[0]} comes {what} against {self.signals[1]}: a seam of the log."
+            )
+        return f"From {self.t:.0f} s on, {self.signals[0]} comes {what}: a seam of the log."
+
+
+class _Delays(NamedTuple):
+    """Delay of one source against another by window: middle [s], delay [s], weight, and 1 / speed [s/m].
+
+    `misfit` (b, L): squared difference in blocks of `block_s`, by `lags` [s].
+    """
+
+    t: FloatArray
+    delay: FloatArray
+    weight: FloatArray
+    slowness: FloatArray
+    block_s: float
+    lags: FloatArray
+    misfit: FloatArray
+
+
+class _Step(NamedTuple):
+    pair: tuple[str, str]
+    t: float
+    size: float
+    p: float
+
+
+def seams(signals: Signals, vehicle: Vehicle, *, seed: int = 1) -> tuple[Seam, ...]:
+    """Jumps of the clock of accelerometer, wheels, reference velocity or torque, first ones first.
+
+    Parameters
+    ----------
+    signals : Signals
+        At the log's own rate.
+    vehicle : Vehicle
+        Radii only: a wrong gain does not matter.
+    seed : int
+        Of the permutations of windows that calibrate the test.
+
+    Limits: two jumps of one signal within half a minute are one; without acceleration there is nothing to see.
+    """
+    sources = _sources(signals, vehicle)
+    slowness = _slowness(signals, vehicle)
+    pairs = list(combinations(sources, 2))
+    rng = np.random.default_rng([seed, 17])
+    steps: list[_Step] = []
+    for a, b in pairs:
+        delays = _delays(sources[a], sources[b], slowness, max(1, round(STEP_S / signals.dt)) * signals.dt)
+        if delays is not None:
+            steps += _steps((a, b), delays, len(pairs), rng)
+    return tuple(sorted(_named(steps, list(sources)), key=lambda s: s.t))
+
+
+def _sources(signals: Signals, vehicle: Vehicle) -> dict[str, FloatArray]:
+    """Accelerations (m,) [m/s²] by source, without what is slow and without noise; NaN where samples are missing."""
+    dt = signals.dt
+    has = {s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height}
+    out: dict[str, FloatArray] = {}
+    if "a_x" in has:
+        out["a_x"] = _band(signals.array("a_x"), dt, is_speed=False)
+    if all(f"omega_{w}" in has for w in WHEELS):
+        free = [w for w in WHEELS if w not in vehicle.driven] or list(WHEELS)
+        rim = np.mean([signals.array(f"omega_{w}") * vehicle.r_e(w) for w in free], axis=0)
+        out["omega"] = _band(rim, dt, is_speed=True)
+    if "v_x" in has:
+        out["v_x"] = _band(signals.array("v_x"), dt, is_speed=True)
+    torques = [w for w in WHEELS if f"torque_{w}" in has]
+    if torques:
+        pull = np.sum([signals.array(f"torque_{w}") / vehicle.r_l(w) for w in torques], axis=0) / vehicle.mass
+        out["torque"] = _band(pull, dt, is_speed=False)
+    return out
+
+
+def _slowness(signals: Signals, vehicle: Vehicle) -> FloatArray:
+    """1 / speed (m,) [s/m] at the steps of the comparison."""
+    names = [f"omega_{w}" for w in WHEELS if f"omega_{w}" in signals.symbols]
+    speeds = [signals.array(n) * vehicle.r_e(n[-2:]) for n in names] or [signals.array("v_x")]
+    v = np.nan_to_num(np.abs(speeds[0]), nan=10.0)
+    return np.asarray(1.0 / np.maximum(v, 2.0))[:: max(1, round(STEP_S / signals.dt))]
+
+
+def _band(x: FloatArray, dt: float, *, is_speed: bool) -> FloatArray:
+    good = np.isfinite(x)
+    filled = np.interp(np.arange(x.size), np.flatnonzero(good), x[good])
+    fast = smooth(filled, dt, FAST_S)
+    if is_speed:
+        fast = np.gradient(fast, dt)
+    out = fast - smooth(fast, dt, SLOW_S)
+    # single lost samples are bridged
+    k = max(1, round(0.1 / dt))
+    share = np.convolve(good.astype(np.float64), np.ones(2 * k + 1) / (2 * k + 1), "same")
+    step = max(1, round(STEP_S / dt))
+    return np.where(share > 0.5, out, np.nan)[::step]
+
+
+def _delays(x: FloatArray, y: FloatArray, slowness: FloatArray, dt: float) -> _Delays | None:
+    """By how much x comes later than y, window by window, around their delay in the whole drive."""
+    reach = round(FARTHEST_S / dt)
+    good = np.isfinite(x) & np.isfinite(y)
+    x, y = np.where(good, x, 0.0), np.where(good, y, 0.0)
+    n = x.size
+    size = max(1, round(BLOCK_S / dt))
+    block_s = size * dt
+    blocks = n // size
+    per = round(WINDOW_S / block_s)
+    if blocks // per < LEAST_WINDOWS:
+        return None
+    wide = _products(x, y, np.arange(-2 * reach, 2 * reach + 1), blocks, size)
+    centre = int(np.argmax(wide[0].sum(axis=0) / np.sqrt(np.maximum(wide[1].sum(axis=0), 1e-12)))) - 2 * reach
+    shifts = np.clip(centre, -reach, reach) + np.arange(-reach, reach + 1)
+    at = shifts + 2 * reach
+    xy, yy, xx = wide[0][:, at], wide[1][:, at], wide[2]
+    m = blocks // per
+    sums = [a[: m * per].reshape(m, per, -1).sum(axis=1) for a in (xy, yy, xx[:, None])]
+    rho = sums[0] / np.sqrt(np.maximum(sums[1] * sums[2], 1e-12))
+    best = np.argmax(rho, axis=1)
+    inside = (best > 0) & (best < shifts.size - 1)
+    i = np.clip(best, 1, shifts.size - 2)
+    row = np.arange(m)
+    left, top, right = rho[row, i - 1], rho[row, i], rho[row, i + 1]
+    curve = np.maximum(2.0 * top - left - right, 1e-9)
+    moved = np.sqrt(sums[2][:, 0] / (per * size)) > LEAST_MOTION
+    used = inside & moved & (top > ALIKE)
+    if used.sum() < LEAST_WINDOWS:
+        return None
+    delay = (shifts[i] + 0.5 * (right - left) / curve) * dt
+    weight = curve / np.maximum(1.0 - top**2, 1e-3)
+    gain = float(sums[0].sum(axis=0).max() / sums[1][:, reach].sum())
+    misfit = xx[:, None] - 2.0 * gain * xy + gain**2 * yy
+    weight = np.minimum(weight[used], 4.0 * float(np.median(weight[used])))
+    slow = slowness[: m * per * size].reshape(m, -1).mean(axis=1)[used]
+    return _Delays((row[used] + 0.5) * per * block_s, delay[used], weight, slow, block_s, shifts * dt, misfit)
+
+
+def _products(
+    x: FloatArray, y: FloatArray, shifts: np.ndarray[tuple[int], np.dtype[np.intp]], blocks: int, size: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Sums over blocks of x(t) y(t - shift) and y(t - shift)^2 (b, L), and of x^2 (b,)."""
+    reach = int(np.abs(shifts).max())
+    padded = np.pad(y, reach)
+    n = blocks * size
+    moved = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)[:n, ::-1]
+    moved = moved.reshape(blocks, size, -1)
+    own = x[:n].reshape(blocks, size)
+    xy = np.matmul(own[:, None, :], moved)[:, 0]
+    square = np.concatenate([[0.0], np.cumsum(padded**2)])
+    starts = np.arange(blocks)[:, None] * size + reach - shifts[None, :]
+    return xy, square[starts + size] - square[starts], (own**2).sum(axis=1)
+
+
+def _steps(pair: tuple[str, str], d: _Delays, tests: int, rng: np.random.Generator, depth: int = 0) -> list[_Step]:
+    """Steps of the delay of one pair: the surest, then those before and after it."""
+    if d.t.size < LEAST_WINDOWS or depth > 2:
+        return []
+    gains, sizes = _scan(d, _clipped(d)[None])
+    at = int(np.argmax(gains[0]))
+    size = float(sizes[0, at])
+    found: list[_Step] = []
+    if abs(size) < LEAST_S:
+        return found
+    # without the step, delays of neighbours stay together: a driver brakes more than once
+    rest = _clipped(d) - size * (np.arange(d.t.size) > at + SIDE - 1)
+    drawn = np.array([rest[_shuffled(d.t.size, rng)] for _ in range(DRAWS)])
+    maxima = _scan(d, drawn)[0].max(axis=1)
+    p = min(1.0, gumbel_p(maxima, float(gains[0, at])) * tests) if gains[0, at] > maxima.max() else 1.0
+    if p > SEAM_LEVEL:
+        return found
+    k = at + SIDE
+    before, after = (float(np.median(x)) for x in (d.delay[:k], d.delay[k:]))
+    t = _placed(d, before, after, float(d.t[max(k - 3, 0)]), float(d.t[min(k + 2, d.t.size - 1)]))
+    found.append(_Step(pair, t, after - before, p))
+    for part in (slice(0, k), slice(k, None)):
+        half = d._replace(
+            t=d.t[part], delay=d.delay[part], weight=d.weight[part], slowness=d.slowness[part]
+        )  # fmt: skip
+        found += _steps(pair, half, tests, rng, depth + 1)
+    return found
+
+
+def _clipped(d: _Delays) -> FloatArray:
+    """Delays without wild ones: each within some deviations of its neighbours' median."""
+    padded = np.pad(d.delay, 3, mode="edge")
+    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 7), axis=1)
+    sd = max(1.4826 * float(np.median(np.abs(d.delay - middle))), 1e-3)
+    return np.asarray(np.clip(d.delay, middle - CLIP * sd, middle + CLIP * sd))
+
+
+def _shuffled(n: int, rng: np.random.Generator) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+    start = int(rng.integers(TOGETHER))
+    groups = np.split(np.arange(n), np.arange(start, n, TOGETHER)[1 if start == 0 else 0 :])
+    return np.concatenate([groups[i] for i in rng.permutation(len(groups))])
+
+
+def _scan(d: _Delays, delays: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """F-type gain of a step beside what is no step, for series (s, m) and all places: gains and sizes (s, places).
+
+    No step are a level, a ramp (a clock that drifts), and a tyre's delay, which falls with the speed.
+    """
+    t, w = d.t, np.sqrt(d.weight)
+    beside = [(x - x.mean()) / max(float(np.ptp(x)), 1e-9) for x in (t, d.slowness)]
+    base, _ = np.linalg.qr(np.stack([w, *(w * x for x in beside)], axis=1))
+    y = delays * w
+    y = y - (y @ base) @ base.T
+    places = np.arange(SIDE, t.size - SIDE + 1)
+    steps = (np.arange(t.size)[None, :] >= places[:, None]) * w
+    steps = steps - (steps @ base) @ base.T
+    energy = (steps**2).sum(axis=1)
+    along = y @ steps.T
+    gain = along**2 / energy
+    left = np.maximum((y**2).sum(axis=1, keepdims=True) - gain, 1e-12)
+    return gain / left * (t.size - 4), along / energy
+
+
+def _placed(d: _Delays, before: float, after: float, start: float, end: float) -> float:
+    """Where the misfit with the one delay becomes larger than with the other. [s]"""
+    a, b = (int(np.argmin(np.abs(d.lags - x))) for x in (before, after))
+    first, last = int(start / d.block_s), int(end / d.block_s)
+    change = np.cumsum(d.misfit[first:last, a] - d.misfit[first:last, b])
+    return (first + 1 + int(np.argmin(change))) * d.block_s if change.size else 0.5 * (start + end)
+
+
+def _named(steps: Sequence[_Step], sources: Sequence[str]) -> list[Seam]:
+    """Steps of pairs as jumps of sources: the source that is in most of the pairs that step at one time."""
+    out = []
+    left = sorted(steps, key=lambda s: s.p)
+    while left:
+        group = [s for s in left if abs(s.t - left[0].t) <= NEAR_S]
+        score = {s: _score(group, s) for s in sources}
+        top = max(score.values())
+        names = [s for s in sources if score[s] == top]
+        p = left[0].p
+        if len(names) == 1:
+            own = [s for s in group if names[0] in s.pair]
+            size = float(np.median([s.size * _sign(s, names[0]) for s in own]))
+            t = min(own, key=lambda s: s.p).t
+            out.append(Seam(t, size, (names[0],), p))
+        else:
+            own = [left[0]]
+            out.append(Seam(left[0].t, left[0].size, left[0].pair, p))
+        left = [s for s in left if s not in group]
+    return out
+
+
+def _score(group: Sequence[_Step], source: str) -> int:
+    return sum(source in s.pair for s in group)
+
+
+def _sign(step: _Step, source: str) -> float:
+    return 1.0 if step.pair[0] == source else -1.0
