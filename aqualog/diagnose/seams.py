@@ -30,10 +30,12 @@ FARTHEST_S = 1.0  # [s] of a jump to either side
 ALIKE = 0.7  # correlation that a window needs: less shows no delay
 LEAST_MOTION = 0.05  # [m/s²] rms in a window
 LEAST_WINDOWS = 12
-SIDE = 3  # windows before and after a step
+SIDE, AROUND = 4, 8  # windows before and after a step; among how many its place is looked for
 LEAST_S = 0.05  # [s] smallest step that counts as a jump: the tyre's own delay changes by 0.04 with the driving
+LEAST_SAMPLES = 0.75
 DRAWS, TOGETHER = 199, 3  # permutations, and neighbours that stay together in them
 CLIP = 3.0  # [sd] of a window's delay
+UNSURE = 20.0  # usual misfits of a block that a place may cost
 NEAR_S = 5.0 * WINDOW_S  # [s] within which steps of several pairs are one seam
 
 
@@ -41,11 +43,12 @@ NEAR_S = 5.0 * WINDOW_S  # [s] within which steps of several pairs are one seam
 class Seam:
     """A jump of a signal's clock at `t` [s]: from there on it comes `size` [s] later; earlier if negative.
 
-    `signals`: the one that jumps; two where no third one tells which. `p_value`: of such a step by chance anywhere in
-    the drive.
+    `between` [s]: first and last likely time; where the car does not accelerate, no delay shows. `signals`: the one that
+    jumps; two where no third one tells which. `p_value`: of such a step by chance anywhere in the drive.
     """
 
     t: float
+    between: tuple[float, float]
     size: float
     signals: tuple[str, ...]
     p_value: float
@@ -64,7 +67,7 @@ class Seam:
 class _Delays(NamedTuple):
     """Delay of one source against another by window: middle [s], delay [s], weight, and 1 / speed [s/m].
 
-    `misfit` (b, L): squared difference in blocks of `block_s`, by `lags` [s].
+    `misfit` (b, L): squared difference in blocks of `block_s`, by `lags` [s]; `least`: smallest step [s].
     """
 
     t: FloatArray
@@ -74,11 +77,14 @@ class _Delays(NamedTuple):
     block_s: float
     lags: FloatArray
     misfit: FloatArray
+    least: float = LEAST_S
 
 
 class _Step(NamedTuple):
     pair: tuple[str, str]
     t: float
+    first: float
+    last: float
     size: float
     p: float
 
@@ -100,12 +106,15 @@ def seams(signals: Signals, vehicle: Vehicle, *, seed: int = 1) -> tuple[Seam, .
     sources = _sources(signals, vehicle)
     slowness = _slowness(signals, vehicle)
     pairs = list(combinations(sources, 2))
-    rng = np.random.default_rng([seed, 17])
     steps: list[_Step] = []
-    for a, b in pairs:
+    for i, (a, b) in enumerate(pairs):
         delays = _delays(sources[a], sources[b], slowness, max(1, round(STEP_S / signals.dt)) * signals.dt)
         if delays is not None:
-            steps += _steps((a, b), delays, len(pairs), rng)
+            # half a sample of a slow bus is no jump
+            rates = [o.rate_hz for n, o in signals.origins.items() if n.split("_")[0] in (a, b) or n in (a, b)]
+            slowest = min((r for r in rates if r > 0.0), default=1.0 / signals.dt)
+            delays = delays._replace(least=max(LEAST_S, LEAST_SAMPLES / min(slowest, 1.0 / signals.dt)))
+            steps += _steps((a, b), delays, len(pairs), np.random.default_rng([seed, i]))
     return tuple(sorted(_named(steps, list(sources)), key=lambda s: s.t))
 
 
@@ -214,7 +223,7 @@ def _steps(pair: tuple[str, str], d: _Delays, tests: int, rng: np.random.Generat
     at = int(np.argmax(gains[0]))
     size = float(sizes[0, at])
     found: list[_Step] = []
-    if abs(size) < LEAST_S:
+    if abs(size) < d.least:
         return found
     # without the step, delays of neighbours stay together: a driver brakes more than once
     rest = _clipped(d) - size * (np.arange(d.t.size) > at + SIDE - 1)
@@ -225,8 +234,10 @@ def _steps(pair: tuple[str, str], d: _Delays, tests: int, rng: np.random.Generat
         return found
     k = at + SIDE
     before, after = (float(np.median(x)) for x in (d.delay[:k], d.delay[k:]))
-    t = _placed(d, before, after, float(d.t[max(k - 3, 0)]), float(d.t[min(k + 2, d.t.size - 1)]))
-    found.append(_Step(pair, t, after - before, p))
+    if abs(after - before) < d.least:
+        return found
+    place = _placed(d, before, after, float(d.t[max(k - AROUND, 0)]), float(d.t[min(k + AROUND, d.t.size) - 1]))
+    found.append(_Step(pair, *place, after - before, p))
     for part in (slice(0, k), slice(k, None)):
         half = d._replace(
             t=d.t[part], delay=d.delay[part], weight=d.weight[part], slowness=d.slowness[part]
@@ -269,12 +280,18 @@ def _scan(d: _Delays, delays: FloatArray) -> tuple[FloatArray, FloatArray]:
     return gain / left * (t.size - 4), along / energy
 
 
-def _placed(d: _Delays, before: float, after: float, start: float, end: float) -> float:
-    """Where the misfit with the one delay becomes larger than with the other. [s]"""
+def _placed(d: _Delays, before: float, after: float, start: float, end: float) -> tuple[float, float, float]:
+    """Where the misfit with the one delay becomes larger than with the other; first and last possible place. [s]"""
     a, b = (int(np.argmin(np.abs(d.lags - x))) for x in (before, after))
     first, last = int(start / d.block_s), int(end / d.block_s)
-    change = np.cumsum(d.misfit[first:last, a] - d.misfit[first:last, b])
-    return (first + 1 + int(np.argmin(change))) * d.block_s if change.size else 0.5 * (start + end)
+    misfit = d.misfit[first:last]
+    if not misfit.size:
+        return 0.5 * (start + end), start, end
+    change = np.cumsum(misfit[:, a] - misfit[:, b])
+    best = int(np.argmin(change))
+    usual = float(np.median(np.minimum(misfit[:, a], misfit[:, b])))
+    near = np.flatnonzero(change <= change[best] + UNSURE * usual)
+    return tuple((first + 1 + int(i)) * d.block_s for i in (best, near[0], near[-1]))  # type: ignore[return-value]
 
 
 def _named(steps: Sequence[_Step], sources: Sequence[str]) -> list[Seam]:
@@ -282,26 +299,22 @@ def _named(steps: Sequence[_Step], sources: Sequence[str]) -> list[Seam]:
     out = []
     left = sorted(steps, key=lambda s: s.p)
     while left:
-        group = [s for s in left if abs(s.t - left[0].t) <= NEAR_S]
+        surest = left[0]
+        group = [
+            s for s in left
+            if s.first <= surest.last + NEAR_S and s.last >= surest.first - NEAR_S and set(s.pair) & set(surest.pair)
+        ]  # fmt: skip
         score = {s: _score(group, s) for s in sources}
-        top = max(score.values())
-        names = [s for s in sources if score[s] == top]
-        p = left[0].p
-        if len(names) == 1:
-            own = [s for s in group if names[0] in s.pair]
-            size = float(np.median([s.size * _sign(s, names[0]) for s in own]))
-            t = min(own, key=lambda s: s.p).t
-            out.append(Seam(t, size, (names[0],), p))
-        else:
-            own = [left[0]]
-            out.append(Seam(left[0].t, left[0].size, left[0].pair, p))
+        names = tuple(s for s in sources if score[s] == max(score.values()))
+        if len(names) > 1:
+            names, group = surest.pair, [surest]
+        own = [s for s in group if names[0] in s.pair]
+        size = float(np.median([s.size * (1.0 if s.pair[0] == names[0] else -1.0) for s in own]))
+        placed = min(own, key=lambda s: s.last - s.first)
+        out.append(Seam(placed.t, (placed.first, placed.last), size, names, surest.p))
         left = [s for s in left if s not in group]
     return out
 
 
 def _score(group: Sequence[_Step], source: str) -> int:
     return sum(source in s.pair for s in group)
-
-
-def _sign(step: _Step, source: str) -> float:
-    return 1.0 if step.pair[0] == source else -1.0
