@@ -314,11 +314,16 @@ def _best(part: _Wheel, order: int, gain: FloatArray, slack: float) -> _Fit | st
     if not fits:
         return "too few turns"
     best = max(fits, key=lambda f: f.log_p - math.log10(f.tries))
-    # an angle that drifts takes amplitude from long sums: the longest one that loses nothing gives the value
-    size = next(
-        f for i, f in enumerate(fits) if f.square >= max((s.square - 0.5 * s.sd for s in fits[i + 1 :]), default=0.0)
-    )
+    size = _lossless(fits)
     return best._replace(tries=best.tries * len(fits), square=size.square, sd=size.sd)
+
+
+def _lossless(fits: Sequence[_Fit]) -> _Fit:
+    """The longest sums that have no less amplitude than shorter ones: an angle that drifts takes it from long sums."""
+    for i, f in enumerate(fits[:-1]):
+        if f.square >= max(s.square - 0.5 * s.sd for s in fits[i + 1 :]):
+            return f
+    return fits[-1]
 
 
 def _summed(
@@ -350,7 +355,7 @@ def _summed(
 
 
 def _fitted(sums: _Sum, slack: float) -> _Fit | None:
-    """F-type test [fisher1925]: power at the order over the mean power at its neighbours."""
+    """F-type test: power at the order over the mean power at its neighbours."""
     count = sums.weight.size
     each = np.abs(sums.transform) ** 2 / sums.weight[:, None]
     power = each.sum(axis=0)

@@ -43,8 +43,8 @@ NEAR_S = 5.0 * WINDOW_S  # [s] within which steps of several pairs are one seam
 class Seam:
     """A jump of a signal's clock at `t` [s]: from there on it comes `size` [s] later; earlier if negative.
 
-    `between` [s]: first and last likely time; where the car does not accelerate, no delay shows. `signals`: the one that
-    jumps; two where no third one tells which. `p_value`: of such a step by chance anywhere in the drive.
+    `between` [s]: first and last likely time; where the car does not accelerate, no delay shows. `signals`: the one
+    that jumps; two where no third one shows which. `p_value`: of such a step by chance anywhere in the drive.
     """
 
     t: float
@@ -57,11 +57,8 @@ class Seam:
     def sentence(self) -> str:
         """In one sentence."""
         what = f"{abs(self.size):.2f} s {'later' if self.size > 0.0 else 'earlier'}"
-        if len(self.signals) > 1:
-            return (
-                f"From {self.t:.0f} s on, {self.signals[0]} comes {what} against {self.signals[1]}: a seam of the log."
-            )
-        return f"From {self.t:.0f} s on, {self.signals[0]} comes {what}: a seam of the log."
+        against = f" against {self.signals[1]}" if len(self.signals) > 1 else ""
+        return f"From {self.t:.0f} s on, {self.signals[0]} comes {what}{against}: a seam of the log."
 
 
 class _Delays(NamedTuple):

@@ -12,7 +12,7 @@ from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Origin
-from aqualog.diagnose.full_rate import PerTurn, per_turn, remarks, to_causes, wheel_columns
+from aqualog.diagnose.full_rate import PerTurn, _Fit, _lossless, per_turn, remarks, to_causes, wheel_columns
 from tests.blind.world.cases import CARS, Hidden, Spec, make_case
 
 CAR = CARS["sedan_rwd"]
@@ -161,6 +161,13 @@ def test_an_angle_that_drifts_takes_nothing_of_the_size():
     results = found(columns)
     assert {k for k in keys(results) if k[1] == 1} == {(w, 1) for w in WHEELS}
     assert all(results[w, 1].high > 1.95e-3 for w in WHEELS)
+
+
+def test_noise_alone_leaves_a_sum_to_take_the_size_from():
+    """Squares are free of bias, so noise makes negative ones."""
+    fits = [_Fit(0.0, square, 1e-9, 1.0, 1, None, 0) for square in (-3e-6, -1e-6, -2e-6)]
+    assert _lossless(fits) is fits[1]
+    assert _lossless([fits[0], fits[2]]) is fits[2]
 
 
 def test_gaps():
