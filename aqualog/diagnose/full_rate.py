@@ -41,6 +41,7 @@ BLOCKS = (512, 64, 16)  # [turns] beside the whole drive: the noise of a wheel s
 GUARD, NULL = 0.03, 0.17  # nearest and farthest order of the null
 ORDER_SLACK = 0.05  # of the order, where a control unit has turned the angle into a speed with a radius of its own
 UNEQUAL, UNEQUAL_LOG_P = 1.6, 3.0  # ratio of amplitudes at low and high speed, and how sure it must be
+APART = 1.2  # ratio of the two speeds
 LEAST_CHANGES, IN_STEP, MOST_HELD = 50, 0.97, 25
 
 Kind = Literal["ring", "speed", "nothing", "untested"]
@@ -207,7 +208,7 @@ def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
     smallest = EFFECTS["tone_ring"].parameters[0].smallest
     out = []
     for f in found:
-        if not f.found:
+        if not f.found or (f.amplitude < smallest and (f.order > 1 or f.kind == "speed")):
             continue
         often = {1: "once", 2: "twice"}.get(f.order, f"{f.order} times")
         what = f"The wheel speed{place(f.wheel)} varies {often} per turn by {f.amplitude:.2%}"
@@ -218,7 +219,7 @@ def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
         elif f.amplitude < smallest:
             out.append(f"Significant, but too small to be worth naming: {what[0].lower()}{what[1:]}.")
     untested = {f.reason for f in found if f.kind == "untested" and f.order == 1}
-    if any(f.order == 1 and f.kind == "ring" for f in found):
+    if to_causes(found):
         out.append("A tyre or rim that runs out of true, by its share of the radius, looks like an uneven tone ring.")
     return (*out, *(f"Unevenness of the wheels' tone rings is not tested: {r}." for r in sorted(untested)))
 
@@ -402,7 +403,8 @@ def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) ->
     middle = float((square / sd**2).sum() / (1.0 / sd**2).sum())
     log_p = chi2_log_p(float((((square - middle) / sd) ** 2).sum()), 2)
     low, high = int(np.argmin(square)), int(np.argmax(square))
-    if log_p < UNEQUAL_LOG_P or square[high] < UNEQUAL**2 * square[low]:
+    apart = max(speeds[high], speeds[low]) >= APART * min(speeds[high], speeds[low])
+    if not apart or log_p < UNEQUAL_LOG_P or square[high] < UNEQUAL**2 * square[low]:
         return ""
     return (
         f"{math.sqrt(square[high]):.2%} at {speeds[high] / (2.0 * math.pi):.1f} turns a second and "
