@@ -54,8 +54,8 @@ class PerTurn:
     `p_value`: of so much by chance anywhere in the drive, over all wheels and orders. `limit`: smallest amplitude that
     is found with a power of 0.9. `speed` [m/s]: lowest and highest that were used; `used_s` [s]. `turns_gain`: turns
     by the log's wheel speed over real turns, where a control unit's own radius has made speeds of them; else 1.
-    `kind`: `ring` if the relative amplitude is the same at low and high speed, `speed` if not; `untested` with the
-    `reason`.
+    `kind`: `ring` if the relative amplitude is the same at low and high speed, `speed` if not, with the largest of the
+    thirds by speed as `most`; `untested` with the `reason`.
     """
 
     wheel: str
@@ -70,6 +70,7 @@ class PerTurn:
     used_s: float = 0.0
     turns_gain: float = math.nan
     reason: str = ""
+    most: float = math.nan
 
     @property
     def found(self) -> bool:
@@ -208,7 +209,7 @@ def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
     smallest = EFFECTS["tone_ring"].parameters[0].smallest
     out = []
     for f in found:
-        if not f.found or (f.amplitude < smallest and (f.order > 1 or f.kind == "speed")):
+        if not f.found or (f.most < smallest if f.kind == "speed" else f.order > 1 and f.amplitude < smallest):
             continue
         often = {1: "once", 2: "twice"}.get(f.order, f"{f.order} times")
         what = f"The wheel speed{place(f.wheel)} varies {often} per turn by {f.amplitude:.2%}"
@@ -292,10 +293,10 @@ def _tested(wheel: _Wheel, order: int, window_s: float | None, slack: float) -> 
     needed = math.sqrt(2.0 * math.log(best.tries / LEVEL)) + POWER_Z
     unlike = _speed_dependence(part, order, gain, best)
     return PerTurn(
-        "", order, "speed" if unlike else "ring", math.sqrt(max(best.square, 0.0)), low, high,
+        "", order, "speed" if unlike[0] else "ring", math.sqrt(max(best.square, 0.0)), low, high,
         min(1.0, 10.0**-log_p), needed * math.sqrt(2.0 * best.noise / total),
         (float(part.mean.min()), float(part.mean.max())), float(used.sum() * wheel.dt),
-        order / (order + float(sums.offset[best.at])), unlike,
+        order / (order + float(sums.offset[best.at])), *unlike,
     )  # fmt: skip
 
 
@@ -380,8 +381,8 @@ def _fitted(sums: _Sum, slack: float) -> _Fit | None:
     return _Fit(log_p, square, sd, noise * wider, max(1, at.size // 2), sums, best)
 
 
-def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) -> str:
-    """How the amplitude differs between thirds of the drive by speed; empty if it does not."""
+def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) -> tuple[str, float]:
+    """How the amplitude differs between thirds of the drive by speed, and the largest; empty if it does not."""
     place_of = np.floor((part.turns - part.turns[0]) * BINS).astype(np.intp)
     sums = _summed(part, order, gain, place_of, BLOCKS[-1], best.sums.finer)
     at = int(np.argmin(np.abs(sums.offset - best.sums.offset[best.at])))
@@ -389,7 +390,7 @@ def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) ->
     share = np.cumsum(sums.weight[by_speed]) / sums.weight.sum()
     thirds = [by_speed[(share > a) & (share <= b + 1e-12)] for a, b in ((0.0, 1 / 3), (1 / 3, 2 / 3), (2 / 3, 1.0))]
     if min(t.size for t in thirds) < 2:
-        return ""
+        return "", math.nan
     squares, sds, speeds = [], [], []
     for third in thirds:
         weight = sums.weight[third]
@@ -405,11 +406,12 @@ def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) ->
     low, high = int(np.argmin(square)), int(np.argmax(square))
     apart = max(speeds[high], speeds[low]) >= APART * min(speeds[high], speeds[low])
     if not apart or log_p < UNEQUAL_LOG_P or square[high] < UNEQUAL**2 * square[low]:
-        return ""
-    return (
+        return "", math.nan
+    reason = (
         f"{math.sqrt(square[high]):.2%} at {speeds[high] / (2.0 * math.pi):.1f} turns a second and "
         f"{math.sqrt(square[low]):.2%} at {speeds[low] / (2.0 * math.pi):.1f}"
     )
+    return reason, math.sqrt(square[high])
 
 
 def _stricter(tests: int) -> float:
