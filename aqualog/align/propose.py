@@ -52,7 +52,7 @@ NOT_A_VALUE = {
     "offset", "sensor", "max", "min", "req", "request", "requested", "target", "displayed", "init", "initializing",
     "alive", "cnt", "lockout", "parity", "encoder",
 }  # fmt: skip
-"""Words of channels that tell of a signal, a message or a wish, but hold no measured value."""
+"""Words of channels about a signal, a message or a wish, which hold no measured value."""
 
 
 @dataclass(frozen=True, slots=True)

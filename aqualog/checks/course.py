@@ -25,7 +25,7 @@ def turning_by_course(latitude: FloatArray, longitude: FloatArray, v: FloatArray
     step_s : float
         [s]
 
-    The rate is the turn from the chord that leads to a place to the chord that leaves it.
+    The rate is the turn from the straight line that leads to a place to the one that leaves it.
     """
     reach = max(1, round(_REACH_S / step_s))
     out = np.full(v.size, np.nan)

@@ -39,9 +39,9 @@ _MOST_DRIVES = 20  # named in the model file
 class Diagnosis(Result):
     """Verdict, causes with size and interval, and what the extended model predicts better.
 
-    `found` holds the records, `logs` the files as they were named, `vehicle_name` the cars, `model_file` the file of
-    the extended model that document and page name, `checks` what does not fit among the signals, `is_of_runs` whether
-    the drives are the runs of a campaign: then the document has each remark once.
+    `found` holds the records, `logs` the files as they were named, `vehicle_name` the cars. `model_file` is
+    the file of the extended model that document and page name. `checks` hold what does not fit among the signals.
+    `is_of_runs`: the drives are the runs of a campaign, and the document has each remark once.
     """
 
     found: Found
