@@ -124,7 +124,7 @@ def read(path: Path, what: str) -> Table:
 
 
 def _kind_of(document: Mapping[str, Any], what: str) -> str:
-    """Return what a file is by its keys: `what` if it has one of that, if `_MARKS` does not list it, or if no key says."""
+    """Return what a file is by its keys: `what` if it has one of that, or where neither marks nor keys say."""
     # a campaign file names its map: `signals = "map.toml"`
     kinds = [k for k, marks in _MARKS.items() if any(n in document and _is_mark(n, document[n]) for n in marks)]
     return what if what not in _MARKS or what in kinds or not kinds else kinds[0]
