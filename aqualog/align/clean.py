@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from aqualog.align.freezes import Freeze, Stretch, freeze_note, in_freezes, stand_watch_of, watch_of
+from aqualog.align.freezes import Freeze, Stretch, freeze_note, stand_watch_of, watch_of, within
 from aqualog.align.glitches import KNOWN_NS, Glitches, glitches_of
-from aqualog.align.lines import in_lines, joined_note, line_watch_of
+from aqualog.align.lines import joined_note, line_watch_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.timebase import MEDIAN_OF
 from aqualog.core.errors import ConfigError, SignalError
@@ -204,8 +204,8 @@ class Cleaner:
         if self.stands is not None:
             self.stands.push(t, x)
         if any(self._unmeasured):
-            repeats = in_freezes(t, self._unmeasured.frozen)
-            joined = in_lines(t, self._unmeasured.joined) & ~repeats
+            repeats = within(t, self._unmeasured.frozen, has_end=True)
+            joined = within(t, self._unmeasured.joined, has_end=False) & ~repeats  # its ends were measured
             self._frozen += int(repeats.sum())
             self._joined += int(joined.sum())
             t, x = _where(~(repeats | joined), t, x)

@@ -19,8 +19,19 @@ from aqualog.align.glitches import is_leap
 from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = [
-    "SPEEDS", "Freeze", "FreezeWatch", "StandWatch", "Stop", "Stretch", "freeze_note", "in_freezes", "longest_stop",
-    "stand_watch_of", "standing_by", "watch_of", "while_moving",
+    "SPEEDS",
+    "Freeze",
+    "FreezeWatch",
+    "StandWatch",
+    "Stop",
+    "Stretch",
+    "freeze_note",
+    "longest_stop",
+    "stand_watch_of",
+    "standing_by",
+    "watch_of",
+    "while_moving",
+    "within",
 ]  # fmt: skip
 
 Freeze = tuple[int, int]
@@ -206,11 +217,12 @@ def while_moving(freezes: Sequence[Freeze], standing: Sequence[Stretch]) -> tupl
     return tuple((a, b) for a, b in freezes if b - a - standing_ns(a, b, standing) >= least_ns)
 
 
-def in_freezes(t_ns: TimeArray, freezes: tuple[Freeze, ...]) -> BoolArray:
-    """Return which samples (n,) repeat the one before."""
+def within(t_ns: TimeArray, stretches: tuple[Stretch, ...], *, has_end: bool) -> BoolArray:
+    """Return which samples (n,) lie in stretches, without the first stamp of each; the last one with `has_end`."""
     out = np.zeros(t_ns.size, dtype=np.bool_)
-    for start, end in freezes:
-        out[np.searchsorted(t_ns, start, side="right") : np.searchsorted(t_ns, end, side="right")] = True
+    for start, end in stretches:
+        last = np.searchsorted(t_ns, end, side="right" if has_end else "left")
+        out[np.searchsorted(t_ns, start, side="right") : last] = True
     return out
 
 

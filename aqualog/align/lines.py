@@ -16,7 +16,7 @@ import numpy as np
 from aqualog.align.freezes import Stretch
 from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
-__all__ = ["LineWatch", "in_lines", "joined_note", "line_watch_of"]
+__all__ = ["LineWatch", "joined_note", "line_watch_of"]
 
 _BLOCK_NS = 1_000_000_000
 _LEAST_SAMPLES = 5  # of a block that is judged
@@ -153,14 +153,6 @@ def _slopes(b: _Block, first: int, k: int, off: float) -> tuple[float, float]:
     """Return the slopes between which a line from the first sample of a block ends within `off` of block k's end."""
     way_ns, rise = max(float(b.after_ns[k] - b.t_ns[first]), 1.0), float(b.after[k] - b.x[first])
     return (rise - off) / way_ns, (rise + off) / way_ns
-
-
-def in_lines(t_ns: TimeArray, lines: tuple[Stretch, ...]) -> BoolArray:
-    """Return which samples (n,) lie within a line; its ends were measured."""
-    out = np.zeros(t_ns.size, dtype=np.bool_)
-    for start, end in lines:
-        out[np.searchsorted(t_ns, start, side="right") : np.searchsorted(t_ns, end, side="left")] = True
-    return out
 
 
 def joined_note(where: str, count: int, first_ns: int, lines: tuple[Stretch, ...]) -> str:

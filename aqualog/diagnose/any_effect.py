@@ -17,7 +17,7 @@ from aqualog.diagnose.noise import Noise, white_noise, whitened
 from aqualog.diagnose.spectrum import weighing
 from aqualog.diagnose.subsets import fit_set, gains_on_top
 
-__all__ = ["Calibration", "bonferroni", "calibrate", "chance", "gumbel_p", "largest"]
+__all__ = ["OPTIMISM", "Calibration", "bonferroni", "calibrate", "chance", "gumbel_p", "largest"]
 
 OPTIMISM = 1.5  # [nats] a column by which noise after a fit is too likely
 FEW = 2  # hypotheses after which the noise is tried

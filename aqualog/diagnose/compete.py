@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.core.records import FloatArray
+from aqualog.diagnose.any_effect import OPTIMISM
 from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.competition import Block, State, added, scored, start, values
 from aqualog.diagnose.spectrum import Weighing
@@ -22,7 +23,6 @@ SWAPPED = 3  # sets in which every member is exchanged
 FEW = 4  # first candidates in each metric after which the noise is tried
 ROUNDS = 3  # of noise after the best set
 DIES = 6.0  # [nats] behind the best set, at which a level of larger sets ends the search
-OPTIMISM = 1.5  # [nats] by which noise after a fit with one column is too likely
 SMALLEST = 1e-12
 
 Members = tuple[int, ...]

@@ -99,8 +99,6 @@ def verdict_sentence(
         if len(causes) == 1 and not sure:
             odds = "" if math.isnan(causes[0].probability) else f" (probability {causes[0].probability:.2f})"
             return f"The car may differ from the model, but this log does not make it certain: {names[0]}{odds}."
-        if len(causes) == 1:
-            return f"Probably: {causes[0].sentence} The log does not settle it."
         return f"The car differs from the model, but this log cannot distinguish {listed(names)}."
     if verdict == "unexplained":
         known = f" beside {listed(names)}" if names else ""

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.align.freezes import FreezeWatch, StandWatch, in_freezes, is_standing, watch_of
+from aqualog.align.freezes import FreezeWatch, StandWatch, is_standing, watch_of, within
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.table import build_signals
 from aqualog.config.vehicle import load_vehicle
@@ -49,7 +49,9 @@ def test_a_sensor_that_repeats_itself(pieces, spans):
     for start, end in spans:
         t, x = frozen(t, x, start, end)
     assert found(t, x, pieces=pieces) == tuple((t[a], t[b]) for a, b in spans)
-    assert np.flatnonzero(in_freezes(t, found(t, x))).tolist() == [k for a, b in spans for k in range(a + 1, b + 1)]
+    assert np.flatnonzero(within(t, found(t, x), has_end=True)).tolist() == [
+        k for a, b in spans for k in range(a + 1, b + 1)
+    ]
 
 
 def held(rate):

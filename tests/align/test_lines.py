@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from aqualog.align.lines import in_lines, line_watch_of
+from aqualog.align.freezes import within
+from aqualog.align.lines import line_watch_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.table import build_signals
 from aqualog.core.records import Channel, ChannelInfo
@@ -43,7 +44,7 @@ def found(t, x, name="v_x", pieces=1):
 def test_a_filled_gap(name, rate, step, pieces):
     t, x = filled(*moving(rate=rate, step=step), 40.0, 99.5, step)
     assert found(t, x, name, pieces) == ((40 * S, 99 * S),)
-    out = in_lines(t, found(t, x, name, pieces))
+    out = within(t, found(t, x, name, pieces), has_end=False)
     assert t[out][0] > 40 * S
     assert t[out][-1] < 99 * S
 
