@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from aqualog.core.vehicle import Vehicle
-from aqualog.diagnose import run
+from aqualog.diagnose import run, unexplained
 from aqualog.diagnose.arena import arena_of
+from aqualog.diagnose.channels import block_means
 from aqualog.diagnose.compete import compete
 from aqualog.diagnose.competition import Block, added, scored, start
+from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.evidence import make_evidence
 from aqualog.diagnose.hypotheses import hypotheses
+from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
 from aqualog.diagnose.spectrum import weighing
@@ -89,16 +92,36 @@ def test_evidence_is_that_of_the_dense_normal_distribution():
 
 
 def test_gains_of_noise_are_those_of_white_noise_once_it_is_weighed():
-    """Without the weighing by the spectrum, slow columns would gain several times that."""
-    gains = []
+    """By the spectrum alone, after noise without colour: columns within the band would gain many times that."""
+    gains, every = [], np.ones(N, dtype=bool)
     for seed in range(12):
         rng = np.random.default_rng([5, seed])
-        y = np.array([slow(rng.standard_normal(N), 0.97) + 0.3 * slow(rng.standard_normal(N), 0.5)])
-        w = weighing(y, np.ones(N, dtype=bool), np.eye(1))
-        x = np.array([[np.cos(np.pi * k * (np.arange(N) + 0.5) / N)] for k in (3, 7, 15, 40, 90)])
+        lines = np.fft.rfft(rng.standard_normal(N))
+        lines[80:160] *= 8.0
+        y = (np.fft.irfft(lines, N) + slow(rng.standard_normal(N), 0.97))[None]
+        w = weighing(y, every, np.eye(1), white_noise(y, every, np.eye(1)))
+        x = np.array([[np.cos(2.0 * np.pi * k * np.arange(N) / N)] for k in (100, 110, 120, 130, 140)])
         rows = w.rows(np.concatenate([x, y[None]]))
         gains += [float((r @ rows[-1]) ** 2 / (r @ r)) for r in rows[:-1]]
     assert 0.5 < np.mean(gains) < 1.7
+
+
+def test_coordinates_are_free_of_the_channels_noise_and_positive_to_the_left():
+    case = make_case(Spec("handling", "white", (), 3, duration_s=60.0, holdout=0))
+    drive = prepare(case.drives[0][1], case.vehicle, "d")
+    v, a_y = drive.coordinates["v_x"], drive.coordinates["a_y"]
+    own = block_means(drive.columns["v_x"], drive.dt)
+    np.testing.assert_array_equal(v, block_means(drive.speed, drive.dt))
+    assert np.std(np.diff(v, 2)) < np.std(np.diff(own, 2))
+    assert np.corrcoef(a_y, block_means(drive.columns["a_y"], drive.dt))[0, 1] > 0.9
+
+
+def test_a_form_must_be_ahead_of_every_known_effect(monkeypatch):
+    a = arena(1, lambda c: hump(c["v_x"]))
+    p = compete(a)
+    known = max(e for members, e in p.sets if all(a.blocks[m].kind != "shape" for m in members))
+    monkeypatch.setattr(unexplained, "AHEAD", p.sets[0][1] - known + 0.1)
+    assert unknown_forms(a, p, seed=1) == ()
 
 
 def test_a_hump_in_speed_is_a_force_over_speed():

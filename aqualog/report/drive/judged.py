@@ -25,7 +25,8 @@ FOLDED: tuple[EpisodeKind, ...] = ("wheel_lock", "single_detector")
 
 EPISODE_HEADS: Sequence[str | tuple[str, str]] = (
     "Episode", ("Start [s]", "from s"), ("End [s]", "to s"), "Where", "Severity", ("v_x [km/h]", "km/h"),
-    ("Resistance [m/s²]", "m/s²"), ("Least slip [%]", "slip %"), ("Way [m]", "m"), ("Detections", ""), "Decided by",
+    ("Resistance [m/s²]", "m/s²"), ("Least slip [%]", "slip %"), ("Distance [m]", "m"), ("Detections", ""),
+    "Decided by",
 )  # fmt: skip
 _WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 # what the joint detectors lack, in a reader's words: beginning of the name -> words
