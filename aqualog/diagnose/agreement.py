@@ -13,44 +13,37 @@ import numpy as np
 
 from aqualog.core.intervals import chi2_log_p
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.evidence import Evidence
-from aqualog.diagnose.noise import Noise, bridged, spectra, whitened
 from aqualog.diagnose.outcome import Z
 from aqualog.diagnose.records import AGREES, Agreement, ByDrive, Cause, Estimate
-from aqualog.diagnose.refit import KNOWN, Refit, metric, whitened_residual
-from aqualog.diagnose.search import Candidate
-from aqualog.diagnose.subsets import PRIOR_WIDTH
+from aqualog.diagnose.refit import KNOWN, PRIOR_WIDTH, Refit, metric
+from aqualog.diagnose.search import Found
 from aqualog.diagnose.words import cause_sentence
 from aqualog.model.effects import EFFECTS
 
 __all__ = ["agreements", "widened"]
 
 
-def agreements(
-    evidence: Evidence, candidate: Candidate, noises: Sequence[Noise], base: FloatArray
-) -> tuple[Agreement, ...]:
+def agreements(found: Found, r: Refit, base: FloatArray) -> tuple[Agreement, ...]:
     """One agreement for each value of the refitted set; empty for a single drive.
 
     Parameters
     ----------
-    evidence : Evidence
-    candidate : Candidate
+    found : Found
+    r : Refit
         Its signatures at its values apply to every drive.
-    noises : sequence of Noise
-        One a drive.
     base : array (k,)
         Values without the effects.
 
     Uses the linear model at the set's values: no drive is simulated again. Tolerances count for each drive separately,
     as if the file had a different error in each.
     """
-    r = candidate.refit
-    if len(evidence.drives) < 2:
+    evidence = found.arena.evidence
+    drives = [evidence.drives[p.drive] for p in found.arena.parts]
+    if len(drives) < 2:
         return ()
     columns = [c for h in r.members for c in evidence.columns[evidence.asked.index(h)]]
-    G, b, apart = _normal(evidence, r, noises, columns)
-    G, b = G / candidate.inflation, b / candidate.inflation
-    keep = np.diag((PRIOR_WIDTH * _prior(evidence, r)) ** -2.0)
+    G, b, apart = _normal(found, r, columns)
+    keep = np.diag((PRIOR_WIDTH * _prior(r)) ** -2.0)
     alone = np.array([np.linalg.solve(g + keep, x) for g, x in zip(G, b, strict=True)])
     # the car's drive-to-drive spread is added to the variance of a single drive's value
     sd = np.array([np.sqrt(np.diag(np.linalg.inv(g + keep)) + apart**2) for g in G])
@@ -65,10 +58,10 @@ def agreements(
         values = r.values[k] + alone[:, k]
         half = Z * sd[:, k]
         each = [Estimate(float(v), float(v - h), float(v + h), unit) for v, h in zip(values, half, strict=True)]
-        p = 10.0 ** -chi2_log_p(_heterogeneity(each), len(evidence.drives) - 1)
+        p = 10.0 ** -chi2_log_p(_heterogeneity(each), len(drives) - 1)
         of_drives = tuple(
             ByDrive(d.name, e, float(r.values[k] + o), float(gain))
-            for d, e, o, gain in zip(evidence.drives, each, others[:, k], gains, strict=True)
+            for d, e, o, gain in zip(drives, each, others[:, k], gains, strict=True)
         )
         out.append(Agreement(r.members[i].key, name, of_drives, p))
     return tuple(out)
@@ -99,26 +92,21 @@ def _heterogeneity(each: Sequence[Estimate]) -> float:
     return float((weight * (values - float(weight @ values) / float(weight.sum())) ** 2).sum())
 
 
-def _normal(
-    evidence: Evidence, r: Refit, noises: Sequence[Noise], columns: Sequence[int]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _normal(found: Found, r: Refit, columns: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Normal equations of each drive around the set's values (D, k, k), (D, k), and the spread between drives (k,)."""
     G, b = [], []
     apart: FloatArray = np.zeros(len(columns))
-    for d, noise, residual, own, s, p in zip(
-        evidence.drives, noises, r.residuals, r.signatures, evidence.signatures, evidence.prepared, strict=True
-    ):
-        one = replace(evidence, drives=(d,), residuals=(residual,), signatures=(s,), prepared=(p,))
-        measure = metric(one, [noise], share=KNOWN, beside=columns)
-        J = whitened(spectra(bridged(own, d.mask)), noise)
-        y = whitened_residual(one, [noise], [residual])
+    for i, (p, w) in enumerate(zip(found.arena.parts, found.posterior.weighings, strict=True)):
+        own = replace(found.arena, parts=(p,), rows=found.arena.rows[i : i + 1])
+        measure = metric(own, [w], share=KNOWN, beside=columns)
+        J, y = measure.rows(r.signatures), measure.rows([x[None] for x in r.residuals])
         G.append(measure.inner(J, J))
-        b.append(measure.inner(J, y[None])[:, 0])
+        b.append(measure.inner(J, y)[:, 0])
         apart = measure.apart[list(columns)]
     return np.array(G), np.array(b), apart
 
 
-def _prior(evidence: Evidence, r: Refit) -> FloatArray:
+def _prior(r: Refit) -> FloatArray:
     return np.array([r.members[i].parameter(n).sigma for i, n in r.names])
 
 

@@ -4,26 +4,20 @@ spectrum."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.channels import contrasts
-from aqualog.diagnose.evidence import Evidence, gram_of, noises_after, tolerant
-from aqualog.diagnose.noise import Noise, white_noise, whitened
-from aqualog.diagnose.spectrum import weighing
-from aqualog.diagnose.subsets import fit_set, gains_on_top
+from aqualog.diagnose.evidence import Evidence, tolerant
+from aqualog.diagnose.records import Significance
 
-__all__ = ["OPTIMISM", "Calibration", "bonferroni", "calibrate", "chance", "gumbel_p", "largest"]
+__all__ = ["Calibration", "bonferroni", "calibrate", "chance", "gains_of", "gumbel_p", "tested"]
 
-OPTIMISM = 1.5  # [nats] a column by which noise after a fit is too likely
-FEW = 2  # hypotheses after which the noise is tried
+SINGULAR = 1e-3  # share of a column's energy that the others of its hypothesis must leave
 ALIKE = 0.97  # cosine of whitened signatures from which one stands for both in the draws
 EULER = 0.5772156649015329
-PLAIN_INFLATION = 1.3  # inflation of the gains without surrogates, as found with simulated noise (D)
 
 
 class Calibration(NamedTuple):
@@ -39,125 +33,64 @@ class Calibration(NamedTuple):
     tested: int
 
 
-def largest(evidence: Evidence, residuals: Sequence[FloatArray], base: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    """Gains (H,) of all hypotheses beside a base set, and the whitened, tolerant inner products.
-
-    The noise is estimated after the hypothesis that makes the measurement most likely. Candidates are the hypotheses
-    that gain most with the residual's spectrum, and those that gain most with white noise. Otherwise a large effect
-    would count as coloured noise and could not be found.
-    """
-    noises = noises_after(evidence, residuals, _theta(evidence, residuals, base))
-    gram = tolerant(evidence, gram_of(evidence, noises, residuals))
-    plain = tolerant(
-        evidence, gram_of(evidence, [_colourless(evidence, i, r) for i, r in enumerate(residuals)], residuals)
-    )
-    best = (sum(n.surprise for n in noises), noises)
-    for metric, most in ((gram, FEW), (plain, FEW)):
-        gains = gains_on_top(evidence, metric, base)
-        for top in np.argsort(-gains)[:most].tolist():
-            fit = fit_set(evidence, metric, (*base, top))
-            if fit is None:
-                continue
-            tried = noises_after(evidence, residuals, dict(zip(fit.columns, fit.theta.tolist(), strict=True)))
-            surprise = sum(n.surprise for n in tried) + OPTIMISM * len(fit.columns)
-            if surprise < best[0]:
-                best = (surprise, tried)
-    gram = tolerant(evidence, gram_of(evidence, best[1], residuals))
-    return gains_on_top(evidence, gram, base), gram
+def gains_of(evidence: Evidence, gram: FloatArray) -> FloatArray:
+    """Twice the log-likelihood that each hypothesis gains alone, without prior, from inner products (K + 1, K + 1).
+    (H,)"""
+    out = np.zeros(len(evidence.asked))
+    for i, columns in enumerate(evidence.columns):
+        c = list(columns)
+        energy = np.diag(gram)[c]
+        if evidence.asked[i].allowed or evidence.barred[i] or np.any(energy < 1e-12):
+            continue
+        out[i] = float(gram[c, -1] @ np.linalg.solve(gram[np.ix_(c, c)], gram[c, -1]))
+    return out
 
 
-def _colourless(evidence: Evidence, i: int, residual: FloatArray) -> Noise:
-    """White noise of the size of a residual's steps."""
-    drive = evidence.drives[i]
-    return white_noise(residual, drive.mask, contrasts(drive.channels))
-
-
-def _theta(evidence: Evidence, residuals: Sequence[FloatArray], base: Sequence[int]) -> dict[int, float]:
-    if not base:
-        return {}
-    gram = tolerant(evidence, gram_of(evidence, noises_after(evidence, residuals, {}), residuals))
-    fit = fit_set(evidence, gram, base)
-    return {} if fit is None else dict(zip(fit.columns, fit.theta.tolist(), strict=True))
-
-
-def calibrate(
-    evidence: Evidence,
-    quiet: Sequence[FloatArray],
-    gram: FloatArray,
-    *,
-    base: Sequence[int],
-    surrogates: int,
-    level: float,
-    seed: int,
-) -> Calibration:
+def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: float, seed: int) -> Calibration:
     """Null distribution of the largest gain.
 
-    Noise alone makes the columns' inner products with the residual Gaussian. Their covariance follows from the columns
-    and from the smoothed cross spectrum of what the autoregression leaves of the noise. So a surrogate [theiler1992] is
-    one draw of normal numbers, as many as there are columns.
+    The residuals are whitened, so noise alone makes the columns' inner products with them normal, with the columns' own
+    inner products as covariance. A surrogate [theiler1992] is one draw of normal numbers, as many as there are columns.
 
     Parameters
     ----------
     evidence : Evidence
-    quiet : sequence of array (C, n)
-        Residuals after the best set: their noise is that of the draws.
-    gram : array (K + 1, K + 1)
-        Shows which hypotheses are alike, so that one test covers them.
-    base : sequence of int
-        Hypotheses that are accepted already; noise is tested beside them.
+    plain : array (K + 1, K + 1)
+        Inner products without tolerances. They also show which hypotheses are alike, so that one test covers them.
     surrogates : int
-        Number of draws. 0: the gains are assumed to be inflated by 1.3, and Bonferroni's bound [bonferroni1936]
-        applies.
+        Number of draws. 0: Bonferroni's bound [bonferroni1936] applies.
     level : float
         Share of logs without effect that may be reported as having one.
     seed : int
     """
-    H = len(evidence.asked)
-    sizes = np.array([len(c) for c in evidence.columns], dtype=np.float64)
-    groups = _groups(evidence, gram)
+    sizes = _sizes(evidence)
+    groups = _groups(evidence, plain)
     leaders = sorted({g for g in groups.tolist() if not evidence.asked[g].allowed})
+    bound = bonferroni(level, len(leaders))
     if surrogates == 0:
-        return Calibration(
-            np.full(H, PLAIN_INFLATION), np.zeros(0), bonferroni(level, len(leaders)), level, len(leaders)
-        )
-    inner, root = _noise_of(evidence, quiet)
+        return Calibration(np.ones(len(sizes)), np.zeros(0), bound, level, len(leaders))
+    inner = plain[:-1, :-1]
+    values, vectors = np.linalg.eigh(inner)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
     rng = np.random.default_rng(seed)
-    drawn = np.array([_drawn(evidence, inner, root @ rng.standard_normal(len(root)), base) for _ in range(surrogates)])
-    inflation = np.maximum(drawn.mean(axis=0) / sizes, 1.0)[groups]
-    maxima = (drawn / inflation / sizes)[:, leaders].max(axis=1)
+    drawn = []
+    for _ in range(surrogates):
+        b = root @ rng.standard_normal(len(root))
+        own = np.block([[inner, b[:, None]], [b[None], np.zeros((1, 1))]])
+        drawn.append(gains_of(evidence, tolerant(evidence, own)))
+    inflation = np.maximum(np.mean(drawn, axis=0) / sizes, 1.0)[groups]
+    maxima = (np.array(drawn) / inflation / sizes)[:, leaders].max(axis=1)
     # where tolerances are larger than the noise, noise alone gives almost no gain; the car's own deviations do
-    threshold = max(_gumbel_quantile(maxima, level), bonferroni(level, len(leaders)))
+    threshold = max(_gumbel_quantile(maxima, level), bound)
     return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()), len(leaders))
 
 
-def _noise_of(evidence: Evidence, quiet: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """Inner products (K, K) of the columns, and a root (K, K) of the covariance of theirs with noise."""
-    K = evidence.count
-    inner, covariance = np.zeros((K, K)), np.zeros((K, K))
-    for r, drive, ready in zip(quiet, evidence.drives, evidence.prepared, strict=True):
-        left = weighing(r, drive.mask, contrasts(drive.channels))
-        columns = whitened(ready, left.noise)
-        inner += columns @ columns.T
-        rows = left.coloured(columns.reshape(K, *r.shape))
-        covariance += rows @ rows.T
-    values, vectors = np.linalg.eigh(covariance)
-    return inner, np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
-
-
-def _drawn(evidence: Evidence, inner: FloatArray, b: FloatArray, base: Sequence[int]) -> FloatArray:
-    """Gains (H,) where the columns have these inner products with the residual."""
-    return gains_on_top(
-        evidence, tolerant(evidence, np.block([[inner, b[:, None]], [b[None], np.zeros((1, 1))]])), base
-    )
-
-
-def gumbel_p(maxima: FloatArray, x: float) -> float:
-    """Share of null maxima beyond x, by a Gumbel distribution of their mean and spread; never below theirs counted."""
-    beta = max(float(maxima.std(ddof=1)) * math.sqrt(6.0) / math.pi, 1e-9)
-    mu = float(maxima.mean()) - EULER * beta
-    tail = -math.expm1(-math.exp(min(-(x - mu) / beta, 50.0)))
-    counted = float((maxima >= x).mean())
-    return max(tail, counted)
+def tested(evidence: Evidence, gram: FloatArray, c: Calibration, level: float) -> Significance:
+    """The test on inner products (K + 1, K + 1) that forgive the tolerances."""
+    statistic = float((gains_of(evidence, gram) / c.inflation / _sizes(evidence)).max())
+    bound = max(chance(statistic, c.tested), 1e-12)
+    p = max(gumbel_p(c.maxima, statistic), bound) if c.maxima.size else bound
+    return Significance(statistic, c.threshold, p, level, c.achieved if c.maxima.size else math.nan, c.maxima.size)
 
 
 def chance(x: float, count: int) -> float:
@@ -165,15 +98,27 @@ def chance(x: float, count: int) -> float:
     return min(1.0, count * math.erfc(math.sqrt(0.5 * max(x, 0.0))))
 
 
+def bonferroni(level: float, count: int) -> float:
+    """Threshold of the largest of `count` gains, each of one degree of freedom, whatever their dependence."""
+    return NormalDist().inv_cdf(1.0 - 0.5 * level / max(count, 1)) ** 2
+
+
+def _sizes(evidence: Evidence) -> FloatArray:
+    return np.array([len(c) for c in evidence.columns], dtype=np.float64)
+
+
+def gumbel_p(maxima: FloatArray, x: float) -> float:
+    """Share of null maxima beyond x, by a Gumbel distribution of their mean and spread; never below theirs counted."""
+    beta = max(float(maxima.std(ddof=1)) * math.sqrt(6.0) / math.pi, 1e-9)
+    mu = float(maxima.mean()) - EULER * beta
+    tail = -math.expm1(-math.exp(min(-(x - mu) / beta, 50.0)))
+    return max(tail, float((maxima >= x).mean()))
+
+
 def _gumbel_quantile(maxima: FloatArray, level: float) -> float:
     beta = float(maxima.std(ddof=1)) * math.sqrt(6.0) / math.pi
     mu = float(maxima.mean()) - EULER * beta
     return mu - beta * math.log(-math.log1p(-level))
-
-
-def bonferroni(level: float, count: int) -> float:
-    """Threshold of the largest of `count` gains, each of one degree of freedom, whatever their dependence."""
-    return NormalDist().inv_cdf(1.0 - 0.5 * level / max(count, 1)) ** 2
 
 
 def _groups(evidence: Evidence, gram: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.intp]]:

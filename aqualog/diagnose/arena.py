@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +27,8 @@ from aqualog.model.term import Model, Term
 
 __all__ = ["Arena", "Part", "arena_of", "known_only", "make_arena", "unit_force"]
 
-KNOWN_PRIOR, SHAPE_PRIOR = 0.03, 0.01  # of an effect at any place, and of a shape of a mechanism, on one drive (K)
+# of an effect at any place, of a shape of a mechanism, and of a road that is not even, on one drive (K)
+KNOWN_PRIOR, SHAPE_PRIOR, ROAD_PRIOR = 0.03, 0.01, 0.2
 MOST_BLOCKS = 12000  # of 0.1 s that compete; a longer drive does with its best 20 min
 FORCE_N = 100.0  # of the force whose response stands for any force
 TOLERATED = ("v_x", "torque", "a_y", "a_x")  # coordinates along which a car and its simulation differ anyway
@@ -36,8 +38,10 @@ ALONG = ("t", "position")
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A stretch `at` of one drive: residual (C, n), mask (n,), `responses` (C, n) by source, `signatures` (k, C, n)."""
+    """A stretch `at` of drive number `drive`: residual (C, n), mask (n,), `signatures` (k, C, n), `responses` (C, n) by
+    source."""
 
+    drive: int
     at: slice
     residual: FloatArray
     mask: BoolArray
@@ -49,7 +53,8 @@ class Part:
 @dataclass(frozen=True, slots=True)
 class Arena:
     """Blocks of columns. `sd` (K,) prior size of each column, by which it is scaled; `tolerance` (K, K) scaled
-    covariance of what cars and files differ by anyway; `rows` per part: where its samples are in the shapes' bases.
+    covariance of what cars and files differ by anyway; `rows` per part: where its samples are in the shapes' bases;
+    `forgiven`: blocks, such as a road, that are only in the tolerance.
     """
 
     evidence: Evidence
@@ -59,6 +64,7 @@ class Arena:
     blocks: tuple[Block, ...]
     sd: FloatArray
     tolerance: FloatArray
+    forgiven: tuple[Block, ...] = ()
 
     @property
     def width(self) -> int:
@@ -88,7 +94,7 @@ class Arena:
         for i, (p, w) in enumerate(zip(self.parts, weighings, strict=True)):
             rows = np.empty((self.width + 1, w.width), dtype=np.float32)
             rows[:known] = w.rows(p.signatures * self.sd[:known, None, None])
-            for b in self.blocks:
+            for b in (*self.blocks, *self.forgiven):
                 if b.kind != "effect":
                     rows[list(b.columns)] = w.rows(self.drawn(i, b))
             rows[-1] = w.rows(p.residual[None])[0]
@@ -108,7 +114,7 @@ class Arena:
                 return np.asarray(np.matmul(rotation, x)[..., used].reshape(len(x), -1))
 
             rows[:known] = white(p.signatures * self.sd[:known, None, None])
-            for b in self.blocks:
+            for b in (*self.blocks, *self.forgiven):
                 if b.kind != "effect":
                     rows[list(b.columns)] = white(self.drawn(i, b))
             rows[-1] = white(p.residual[None])[0]
@@ -167,7 +173,7 @@ def arena_of(evidence: Evidence, forces: Sequence[FloatArray]) -> Arena:
         if forces:
             responses["unit_force"] = forces[d][:, at]
         mask = drive.mask[at]
-        parts.append(Part(at, evidence.residuals[d][:, at], mask, drive.channels, signatures, responses))
+        parts.append(Part(d, at, evidence.residuals[d][:, at], mask, drive.channels, signatures, responses))
         coordinates.append({n: x[at] for n, x in drive.coordinates.items()})
     names = [n for n in coordinates[0] if all(n in c for c in coordinates) and (len(parts) == 1 or n not in ALONG)]
     joint = {n: np.concatenate([c[n] for c in coordinates]) for n in names}
@@ -179,15 +185,24 @@ def arena_of(evidence: Evidence, forces: Sequence[FloatArray]) -> Arena:
     return Arena(evidence, tuple(parts), rows, made, blocks, sd, _tolerance(evidence, made, blocks, sd))
 
 
-def known_only(arena: Arena) -> Arena:
-    """The arena without shapes, and without the tolerances along coordinates.
+def known_only(arena: Arena, roads: Sequence[Block]) -> Arena:
+    """The arena without unknown shapes and without the tolerances along coordinates; `roads` are marginalised.
 
     Those tolerances forgive a drag or a slip slope that is off by several of its own. Whether a form is unknown must
     not depend on them; which known effect it is may be judged more sharply.
     """
     k = arena.evidence.count
     blocks = tuple(b for b in arena.blocks if b.kind == "effect")
-    return replace(arena, shapes=(), blocks=blocks, sd=arena.sd[:k], tolerance=arena.tolerance[:k, :k])
+    own = [*range(k), *(c for b in roads for c in b.columns)]
+    tolerance = np.zeros((len(own), len(own)))
+    tolerance[:k, :k] = arena.tolerance[:k, :k]
+    forgiven, at = [], k
+    for b in roads:
+        n = len(b.columns)
+        tolerance[at : at + n, at : at + n] = b.prior
+        forgiven.append(replace(b, columns=tuple(range(at, at + n))))
+        at += n
+    return replace(arena, blocks=blocks, sd=arena.sd[own], tolerance=tolerance, forgiven=tuple(forgiven))
 
 
 def _stretches(drives: Sequence[Drive]) -> list[tuple[int, slice]]:
@@ -224,9 +239,10 @@ def _blocks(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, ...
     n = evidence.count
     for j, s in enumerate(made):
         k = s.basis.columns.shape[1]
-        kind = "road" if s.mechanism.name == "road" else "shape"
         own = tuple(range(n, n + k))
-        out.append(Block(s.key, kind, own, s.basis.prior, math.log(SHAPE_PRIOR / each[s.mechanism.name]), j))  # type: ignore[arg-type]
+        kind: Literal["road", "shape"] = "road" if s.mechanism.is_road else "shape"
+        usual = ROAD_PRIOR if s.mechanism.is_road else SHAPE_PRIOR / each[s.mechanism.name]
+        out.append(Block(s.key, kind, own, s.basis.prior, math.log(usual), j))
         sd.append(np.full(k, s.mechanism.usual))
         n += k
     return tuple(out), np.concatenate(sd)

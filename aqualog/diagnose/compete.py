@@ -9,11 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.any_effect import OPTIMISM
 from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.competition import Block, State, added, scored, start, values
 from aqualog.diagnose.spectrum import Weighing
-from aqualog.diagnose.subsets import SINGULAR, TWINS, compatible
+from aqualog.diagnose.subsets import TWINS, compatible
 
 __all__ = ["Fitted", "Posterior", "compete", "fitted"]
 
@@ -23,7 +22,9 @@ SWAPPED = 3  # sets in which every member is exchanged
 FEW = 4  # first candidates in each metric after which the noise is tried
 ROUNDS = 3  # of noise after the best set
 DIES = 6.0  # [nats] behind the best set, at which a level of larger sets ends the search
+SINGULAR = 1e-3  # share of a column's energy that the others of its set must leave
 SMALLEST = 1e-12
+OPTIMISM = 1.5  # [nats] a column by which noise after a fit is too likely
 
 Members = tuple[int, ...]
 

@@ -312,6 +312,8 @@ def _coordinates(
         out["water_depth"] = depth
     if "yaw_rate" in columns:
         out["a_y"] = speed * columns["yaw_rate"]
+    if "steer_angle" in columns:
+        out["steer_angle"] = course.steer
     if "ambient_temperature" in columns:
         out["ambient_temperature"] = columns["ambient_temperature"]
     return {n: block_means(x, dt) for n, x in out.items()}

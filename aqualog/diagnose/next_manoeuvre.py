@@ -20,9 +20,9 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.isolate import p_correct
 from aqualog.diagnose.manoeuvres import SENSORS, Run, Sensor, checks, fitting
 from aqualog.diagnose.noise import Noise
+from aqualog.diagnose.outcome import CREDIBLE, Rival
 from aqualog.diagnose.records import Manoeuvre
 from aqualog.diagnose.run_information import Case, of_check, of_log, of_run
-from aqualog.diagnose.search import CREDIBLE, Candidate
 from aqualog.diagnose.words import listed, name_of
 from aqualog.model.term import Check, Model
 
@@ -71,7 +71,7 @@ class _Option:
 
 
 def next_manoeuvre(
-    evidence: Evidence, credible: Sequence[Candidate], noises: Sequence[Noise], model: Model
+    evidence: Evidence, credible: Sequence[Rival], noises: Sequence[Noise], model: Model
 ) -> Manoeuvre | None:
     """The run, check or sensor that distinguishes sets that the log cannot distinguish.
 
@@ -79,7 +79,7 @@ def next_manoeuvre(
     ----------
     evidence : Evidence
         Drives with the signatures of all hypotheses.
-    credible : sequence of Candidate
+    credible : sequence of Rival
         Refitted sets, best first.
     noises : sequence of Noise
         Of each drive, after the best set.
@@ -127,7 +127,7 @@ def next_manoeuvre(
     return _otherwise(case, log)
 
 
-def _effects(c: Candidate) -> frozenset[str]:
+def _effects(c: Rival) -> frozenset[str]:
     return frozenset(h.effect.name for h in c.refit.members)
 
 

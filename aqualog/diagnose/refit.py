@@ -9,17 +9,18 @@ import numpy as np
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import FloatArray
+from aqualog.diagnose.arena import Arena, Part
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
-from aqualog.diagnose.noise import Noise, bridged, spectra, whitened
-from aqualog.diagnose.subsets import PRIOR_WIDTH, SetFit
+from aqualog.diagnose.spectrum import Weighing
 from aqualog.model.term import Model
 
-__all__ = ["KNOWN", "Metric", "Refit", "metric", "refit", "whitened_residual"]
+__all__ = ["KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "metric", "refit"]
 
 KNOWN = 0.25  # share of the tolerances that values and intervals take into account
 # factor on the tolerances of the water laws, which are guesses; naming a cause must not depend on their accuracy
 DOUBT = 2.0
+PRIOR_WIDTH = 3.0  # the prior is this much wider than the effect's: it only keeps huge, cancelling pairs apart
 SHRINK = (1.0, 0.5, 0.2)
 ROUNDS = 6
 HOLDS = 0.1  # share by which a signature may miss its predicted gain before it is simulated again
@@ -57,18 +58,26 @@ class Metric:
     `apart` (K,): standard deviations that are not in the metric and are added to those of the values found.
     """
 
-    noises: tuple[Noise, ...]
+    parts: tuple[Part, ...]
+    weighings: tuple[Weighing, ...]
     A: FloatArray
     M: FloatArray
     apart: FloatArray
+
+    def rows(self, each: Sequence[FloatArray]) -> FloatArray:
+        """Arrays (k, C, n) of each drive as rows (k, N)."""
+        found = [w.rows(each[p.drive][..., p.at]) for p, w in zip(self.parts, self.weighings, strict=True)]
+        return np.concatenate(found, axis=1)
 
     def inner(self, u: FloatArray, w: FloatArray) -> FloatArray:
         """Inner products of rows (a, N) and (b, N): (a, b)."""
         return np.asarray(u @ w.T - (u @ self.A.T) @ self.M @ (self.A @ w.T))
 
 
-def metric(evidence: Evidence, noises: Sequence[Noise], *, share: float = 1.0, beside: Sequence[int] = ()) -> Metric:
-    """Inner products under noise and a share of the tolerances, as in `evidence.tolerant`.
+def metric(
+    arena: Arena, weighings: Sequence[Weighing], *, share: float = 1.0, beside: Sequence[int] = ()
+) -> Metric:  # fmt: skip
+    """Inner products under noise and a share of the tolerances, as in `Arena.tolerant`.
 
     Sets are compared with the full tolerances. Values are estimated with the share `KNOWN`: vehicle files usually err
     by less than the tolerances, and a fit that tolerates its own effect would look for it where it hardly shows. The
@@ -78,7 +87,10 @@ def metric(evidence: Evidence, noises: Sequence[Noise], *, share: float = 1.0, b
     The columns `beside`, whose values are estimated, are an exception, and so is every effect that looks the same.
     Their spread is not part of the metric; it is added to the variance of the estimated values (`Metric.apart`). Both
     ways agree as long as a signature does not change with its value (D). Only the second stays right if it does.
+
+    What the arena forgives, such as a road, is marginalised with its prior.
     """
+    evidence = arena.evidence
     apart = np.zeros(evidence.count)
     apart[list(beside)] = evidence.as_values[list(beside)]
     sought = {evidence.kinds[c] for c in beside} - {""}
@@ -86,48 +98,40 @@ def metric(evidence: Evidence, noises: Sequence[Noise], *, share: float = 1.0, b
     owner = {c: h for h, columns in zip(evidence.asked, evidence.columns, strict=True) for c in columns}
     shares = np.array([DOUBT if owner[c].of_water else share for c in range(evidence.count)])
     sd = np.maximum(shares * evidence.tolerance, known)
-    k = np.flatnonzero(sd > 0.0).tolist()
-    A = np.concatenate([whitened(p.of(k), n) for p, n in zip(evidence.prepared, noises, strict=True)], axis=1)
-    seen = np.flatnonzero((A**2).sum(axis=1) > 1e-12)
-    A = A[seen]
-    M = np.linalg.inv(A @ A.T + np.diag(sd[k][seen] ** -2.0))
-    return Metric(tuple(noises), A, M, apart)
+    k = np.flatnonzero(sd > 0.0)
+    pieces = []
+    for i, (p, w) in enumerate(zip(arena.parts, weighings, strict=True)):
+        columns = [p.signatures[k] * sd[k, None, None]]
+        columns += [np.tensordot(np.linalg.cholesky(b.prior).T, arena.drawn(i, b), axes=1) for b in arena.forgiven]
+        pieces.append(w.rows(np.concatenate(columns)))
+    A = np.concatenate(pieces, axis=1)
+    return Metric(arena.parts, tuple(weighings), A, np.asarray(np.linalg.inv(np.eye(len(A)) + A @ A.T)), apart)
 
 
-def whitened_residual(evidence: Evidence, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:
-    """All drives' residuals as unit innovations, flat."""
-    parts = [
-        whitened(spectra(bridged(r, d.mask)[None]), n)[0]
-        for r, d, n in zip(residuals, evidence.drives, noises, strict=True)
-    ]
-    return np.concatenate(parts)
-
-
-def refit(evidence: Evidence, fit: SetFit, measure: Metric, model: Model) -> Refit | None:
+def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure: Metric, model: Model) -> Refit | None:
     """Gauss-Newton in the simulator from the linear values on; None if it has no solution within the bounds.
 
     Parameters
     ----------
     evidence : Evidence
-    fit : SetFit
-        Its values are where the search starts.
+    chosen : sequence of int
+        Hypotheses of the set.
+    start : array (k,)
+        Changes of their values with which the search starts.
     measure : Metric
         Held fixed, so that sets can be compared.
     model : Model
         On which the set comes.
     """
-    noises = measure.noises
-    members = tuple(evidence.asked[m] for m in fit.members)
+    members = tuple(evidence.asked[m] for m in chosen)
     names = tuple((i, n) for i, h in enumerate(members) for n in h.free)
-    columns = list(fit.columns)
+    columns = [c for m in chosen for c in evidence.columns[m]]
     base = np.array([value_in(model, members[i], n) for i, n in names])
     low, high = base + evidence.low[columns], base + evidence.high[columns]
     width = PRIOR_WIDTH * evidence.prior[columns]
-    J = np.concatenate(
-        [whitened(p.of(columns), n) for p, n in zip(evidence.prepared, noises, strict=True)], axis=1
-    )  # (k, N): change of the residual by one unit
-    values = np.clip(base + fit.theta, low, high)
-    found = _try(evidence, members, names, values, noises, model)
+    J = measure.rows([s[columns] for s in evidence.signatures])  # (k, N): change of the residual by one unit
+    values = np.clip(base + start, low, high)
+    found = _try(evidence, members, names, values, measure, model)
     if found is None:
         return None
     y, residuals, extended = found
@@ -141,7 +145,7 @@ def refit(evidence: Evidence, fit: SetFit, measure: Metric, model: Model) -> Ref
         won = 0.0
         for shrink in SHRINK if promised >= ENOUGH else ():
             new = np.clip(values + shrink * step, low, high)
-            tried = _try(evidence, members, names, new, noises, model)
+            tried = _try(evidence, members, names, new, measure, model)
             if tried is None:
                 continue
             won = loss - _loss(measure, tried[0], (new - base) / width)
@@ -157,10 +161,10 @@ def refit(evidence: Evidence, fit: SetFit, measure: Metric, model: Model) -> Ref
         elif fresh:
             break
         if not fresh:
-            J = _rows(evidence, _slopes(evidence, members, residuals, extended), noises)
+            J = measure.rows(_slopes(evidence, members, residuals, extended))
             fresh = True
     slopes = _slopes(evidence, members, residuals, extended)
-    J = _rows(evidence, slopes, noises)
+    J = measure.rows(slopes)
     covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0)) + np.diag(measure.apart[columns] ** 2)
     at_bound = bool(np.any((values <= low + 1e-12) | (values >= high - 1e-12)))
     unlikely = _unlikely((values - base) / evidence.prior[columns])
@@ -198,7 +202,7 @@ def _try(
     members: tuple[Hypothesis, ...],
     names: tuple[tuple[int, str], ...],
     values: FloatArray,
-    noises: Sequence[Noise],
+    measure: Metric,
     model: Model,
 ) -> tuple[FloatArray, list[FloatArray], Model] | None:
     by_member: list[dict[str, float]] = [{} for _ in members]
@@ -209,7 +213,7 @@ def _try(
         residuals = [residual(d, extended) for d in evidence.drives]
     except ConfigError:
         return None
-    return whitened_residual(evidence, noises, residuals), residuals, extended
+    return measure.rows([r[None] for r in residuals])[0], residuals, extended
 
 
 def _slopes(
@@ -219,8 +223,3 @@ def _slopes(
         np.concatenate(signatures(d, extended, members, base=r, each=True))
         for d, r in zip(evidence.drives, residuals, strict=True)
     )
-
-
-def _rows(evidence: Evidence, slopes: Sequence[FloatArray], noises: Sequence[Noise]) -> FloatArray:
-    parts = [whitened(spectra(bridged(s, d.mask)), n) for s, d, n in zip(slopes, evidence.drives, noises, strict=True)]
-    return np.concatenate(parts, axis=1)

@@ -13,23 +13,21 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, widened
-from aqualog.diagnose.arena import known_only, make_arena
-from aqualog.diagnose.channels import CHANNELS, block_step
-from aqualog.diagnose.compete import compete
+from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.gain import measured_gain
-from aqualog.diagnose.grade import Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, value_in, with_values
-from aqualog.diagnose.judge import judged, repeats, with_causes
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
-from aqualog.diagnose.outcome import Outcome, conclude, one_per_name
-from aqualog.diagnose.records import Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView, Verdict
+from aqualog.diagnose.noise import Noise, fit_noise
+from aqualog.diagnose.outcome import Outcome, conclude, with_causes
+from aqualog.diagnose.probability import SURE
+from aqualog.diagnose.records import Agreement, Consequence, Diagnosis, Gain, ResidualView, Verdict
+from aqualog.diagnose.road import Road
 from aqualog.diagnose.search import Found, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
-from aqualog.diagnose.unexplained import unknown_forms
 from aqualog.diagnose.unknown_term import as_term, short_form
 from aqualog.diagnose.words import verdict_sentence
 from aqualog.model.term import Model
@@ -37,8 +35,6 @@ from aqualog.model.term import Model
 __all__ = ["Options", "diagnose"]
 
 LEAST_USED_S = 20.0
-# rms of a road's slope that is named: on measured drives the logged elevation did not confirm about 1 %
-HILLY = 0.015
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,49 +98,40 @@ def diagnose(
     used = sum(d.used_s for d in ready)
     if used < LEAST_USED_S:
         return _not_testable(ready, model, f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed", notes)
-    given = model
-    if given.terms:
-        ready = [led_by(d, given) for d in ready]
-    road = _road(ready, model)
-    hilly = road is not None and road.rms.value >= HILLY
-    if road is not None:
-        # named or not: a car needs more torque uphill, and the torque would appear to be the cause
-        model = with_profile(model, road)
+    if model.terms:
         ready = [led_by(d, model) for d in ready]
     asked, untested = hypotheses(ready, model)
-    evidence = simulated(ready, asked, model, tell)
-    evidence = supported(evidence)
+    evidence = supported(simulated(ready, asked, model, tell))
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
-    outcome = conclude(evidence, found.candidates, model, p_value=found.tests[0].p_value)
-    outcome, agreed = _by_drive(evidence, found, outcome, model)
-    tell("known effects against unknown forms", 0.8)
-    outcome, remainders = _competed(evidence, found, outcome, model, options)
-    if road is not None:
-        outcome = _with_road(outcome, road, named=hilly)
-    extended = _extended(outcome, remainders, model if hilly else given, asked)
+    outcome = conclude(found, model)
+    outcome, agreed = _by_drive(found, outcome, model)
+    noises = _noises(evidence, outcome)
+    if found.road is not None:
+        outcome = _with_road(outcome, found.road)
+    extended = _extended(outcome, found, model, asked)
     sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.inflation, found.calibration.threshold)
-    before = [_led(d, given) for d in ready] if road is not None else list(evidence.residuals)
-    after = [_led(d, extended) for d in ready] if extended.terms != model.terms else list(evidence.residuals)
+    before = list(evidence.residuals)
+    after = [_led(d, extended) for d in ready] if extended.terms != model.terms else before
     gained = None
-    if extended.terms != given.terms:
+    if extended.terms != model.terms:
         tell("measuring the gain", 0.88)
-        gained = _gained(ready, holdout, vehicle, given, extended, found, options)
+        gained = _gained(ready, holdout, vehicle, model, extended, noises[0], options)
     next_run = None
     if outcome.verdict == "cannot_tell":
         tell("searching for a run that distinguishes the causes", 0.95)
-        next_run = next_manoeuvre(evidence, one_per_name(found.candidates), found.noises, model)
+        next_run = next_manoeuvre(evidence, outcome.rivals, noises, model)
     return Diagnosis(
         verdict=outcome.verdict,
-        sentence=_sentence(outcome, remainders, found, options),
+        sentence=_sentence(outcome, found, options),
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
         used_s=used,
         causes=outcome.causes,
         alternatives=outcome.alternatives,
-        significance=found.tests[0],
+        significance=found.significance,
         limits=isolate.limits(evidence, sizes),
         confusions=isolate.confusions(evidence, found.gram, sizes, found.calibration.inflation),
-        remainders=remainders,
+        remainders=found.forms,
         manoeuvre=next_run,
         gain=gained,
         model=extended,
@@ -156,23 +143,15 @@ def diagnose(
     )
 
 
-def _competed(
-    evidence: Evidence, found: Found, outcome: Outcome, model: Model, options: Options
-) -> tuple[Outcome, tuple[Remainder, ...]]:
-    """The verdict with probabilities, and the unknown forms: of all that competes, else of known effects alone."""
-    arena = make_arena(evidence, model)
-    posterior = compete(arena)
-    remainders = unknown_forms(arena, posterior, seed=options.seed)
-    failed = repeats(outcome.chosen, arena, found.noises, model) if outcome.chosen is not None else ()
-    if not remainders:
-        arena = known_only(arena)
-        posterior = compete(arena)
-    return judged(outcome, remainders, arena, posterior, model, failed), remainders
+def _noises(evidence: Evidence, outcome: Outcome) -> list[Noise]:
+    """Noise of each drive after the chosen set."""
+    quiet = evidence.residuals if outcome.chosen is None else outcome.chosen.residuals
+    return [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, evidence.drives, strict=True)]
 
 
-def _sentence(outcome: Outcome, remainders: tuple[Remainder, ...], found: Found, options: Options) -> str:
-    reason = f" ({short_form(remainders[0])})" if remainders else ", and no function of the logged quantities does"
-    p = found.tests[0].p_value
+def _sentence(outcome: Outcome, found: Found, options: Options) -> str:
+    reason = f" ({short_form(found.forms[0])})" if found.forms else ""
+    p = found.significance.p_value
     return verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
         seen=p if p <= options.level else None,
@@ -181,7 +160,7 @@ def _sentence(outcome: Outcome, remainders: tuple[Remainder, ...], found: Found,
 
 def _gained(
     ready: Sequence[Drive], holdout: Sequence[tuple[str, Signals]], vehicle: Vehicle, given: Model, extended: Model,
-    found: Found, options: Options,
+    noise: Noise, options: Options,
 ) -> Gain:  # fmt: skip
     """Gain of the extended model over the given one: on unseen drives if there are any, else on the diagnosed ones."""
     elsewhere = _without_road(extended, given)  # a road is this drive's own
@@ -191,24 +170,19 @@ def _gained(
     if options.consequences and "mass" in vehicle.given:
         effects = consequences(vehicle, elsewhere, seed=options.seed)
     return measured_gain(
-        unseen or ready, given, elsewhere if unseen else extended, found.noises[0], seed=options.seed,
+        unseen or ready, given, elsewhere if unseen else extended, noise, seed=options.seed,
         in_sample=not unseen, consequences=effects,
     )  # fmt: skip
 
 
-def _by_drive(
-    evidence: Evidence, found: Found, outcome: Outcome, model: Model
-) -> tuple[Outcome, tuple[Agreement, ...]]:
+def _by_drive(found: Found, outcome: Outcome, model: Model) -> tuple[Outcome, tuple[Agreement, ...]]:
     """Values of the chosen set drive by drive; intervals grow where the drives differ."""
-    chosen = next((c for c in found.candidates if c.refit is outcome.chosen), None)
-    if chosen is None:
+    r = outcome.chosen
+    if r is None:
         return outcome, ()
-    r = chosen.refit
-    agreed = agreements(
-        evidence, chosen, found.noises, np.array([value_in(model, r.members[i], n) for i, n in r.names])
-    )
-    named = {c.key for c in outcome.causes}
+    agreed = agreements(found, r, np.array([value_in(model, r.members[i], n) for i, n in r.names]))
     causes = tuple(widened(c, agreed) for c in outcome.causes)
+    named = {c.key for c in causes}
     return outcome._replace(causes=causes), tuple(a for a in agreed if a.key in named)
 
 
@@ -216,16 +190,11 @@ def _led(drive: Drive, model: Model) -> FloatArray:
     return residual(led_by(drive, model), model)
 
 
-def _road(drives: Sequence[Drive], model: Model) -> Profile | None:
-    """The road of a single drive."""
-    return find_profile(drives[0], residual(drives[0], model)) if len(drives) == 1 else None
-
-
-def _with_road(outcome: Outcome, road: Profile, *, named: bool) -> Outcome:
-    if not named:
-        told = f"Significant, but too small to be worth naming: {road.cause.sentence}"
-        return outcome._replace(small=(*outcome.small, told))
+def _with_road(outcome: Outcome, road: Road) -> Outcome:
     cause, own = road.cause, outcome.causes
+    if not road.named or cause.probability < SURE:
+        note = f"Not named (probability {cause.probability:.2f}): {cause.sentence}"
+        return outcome._replace(small=(*outcome.small, note))
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
         # one road: a constant slope is its mean, whose interval knows that it is an offset as well
         own = tuple(c for c in own if c.effect != cause.effect)
@@ -242,27 +211,28 @@ def _without_road(extended: Model, given: Model) -> Model:
 
 
 def _unnamed(outcome: Outcome, found: Found, options: Options) -> tuple[str, ...]:
-    p = found.tests[0].p_value
+    p = found.significance.p_value
     if outcome.verdict != "no_effect" or p > options.level:
         return ()
     return (f"The test found more than noise (p = {p:.2g}), but no effect large enough to be worth naming.",)
 
 
-def _extended(outcome: Outcome, remainders: Sequence[Remainder], model: Model, asked: Sequence[Hypothesis]) -> Model:
+def _extended(outcome: Outcome, found: Found, model: Model, asked: Sequence[Hypothesis]) -> Model:
     extended = model
+    named = {c.key for c in outcome.causes}
     if outcome.verdict == "unexplained":
         extended = with_causes(model, [c for c in outcome.causes if c.key in {h.key for h in asked}], asked)
-    if outcome.chosen is not None:
+    if (best := outcome.chosen) is not None:
         # effects too small to be named are not put into the model either
-        named = {c.key for c in outcome.causes}
-        best = outcome.chosen
         extended = with_values(model, [
             (h, {n: v for (i, n), v in zip(best.names, best.values.tolist(), strict=True) if best.members[i] is h})
             for h in best.members
             if h.key in named
         ])  # fmt: skip
-    for r in remainders:
-        term = as_term(r)
+    terms = [as_term(r) for r in found.forms]
+    if found.road is not None and "road_grade" in named:
+        terms.append(found.road.term)
+    for term in terms:
         if term is not None and all(t.effect is not term.effect for t in extended.terms):
             extended = extended.with_term(term)
     return extended

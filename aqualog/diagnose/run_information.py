@@ -16,7 +16,7 @@ from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_
 from aqualog.diagnose.isolate import separation
 from aqualog.diagnose.manoeuvres import Run, Sensor, programme, turned
 from aqualog.diagnose.noise import Noise, bridged, for_mask, spectra, whitened
-from aqualog.diagnose.search import Candidate
+from aqualog.diagnose.outcome import Rival
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Check, Model
@@ -34,7 +34,7 @@ class Case:
     """The decision to make: the sets, their pairs, and all tolerances as (hypothesis, parameter, its sd)."""
 
     evidence: Evidence
-    credible: tuple[Candidate, ...]
+    credible: tuple[Rival, ...]
     noises: tuple[Noise, ...]
     model: Model
     pairs: tuple[tuple[int, int], ...]
@@ -73,7 +73,7 @@ class Case:
             at += len(c.refit.values)
         ways = [
             [
-                _certain(gram, (a, b, at), own[b]) / max(self.credible[a].inflation, 1.0)
+                _certain(gram, (a, b, at), own[b])
                 for a, b in ((i, j), (j, i))
                 # a set that holds the truth and more can always imitate it
                 if any(h not in self.credible[b].refit.members for h in self.credible[a].refit.members)

@@ -1,4 +1,9 @@
-"""From residuals to the sets of effects that explain them, adding effects until the test finds no more."""
+"""From residuals to sets of effects with probabilities: a competition on linear signatures, and its best sets refitted.
+
+The competition visits thousands of sets on inner products. Signatures are straight lines, effects are not: so the
+competition is repeated around its own best set, and the sets that hold most of the posterior are refitted in the
+simulator, which gives their evidence anew.
+"""
 
 from __future__ import annotations
 
@@ -11,67 +16,56 @@ import numpy as np
 
 from aqualog.core.notation import AXLES
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.any_effect import Calibration, bonferroni, calibrate, chance, gumbel_p, largest
-from aqualog.diagnose.channels import contrasts
+from aqualog.diagnose.any_effect import Calibration, calibrate, tested
+from aqualog.diagnose.arena import Arena, known_only, make_arena
+from aqualog.diagnose.compete import Members, Posterior, compete, fitted
+from aqualog.diagnose.competition import added, start
 from aqualog.diagnose.drive import Drive, led_by
-from aqualog.diagnose.evidence import Evidence, make_evidence, noises_after
+from aqualog.diagnose.evidence import Evidence, make_evidence, tolerant
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
-from aqualog.diagnose.noise import Noise, bridged, fit_noise, spectra
-from aqualog.diagnose.records import Significance
-from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit, whitened_residual
-from aqualog.diagnose.subsets import SetFit, best_sets, compatible, fit_set, imitations
+from aqualog.diagnose.records import Remainder, Significance
+from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
+from aqualog.diagnose.road import Road, road_of, roads_in
+from aqualog.diagnose.subsets import compatible, imitations
+from aqualog.diagnose.unexplained import unknown_forms
 from aqualog.model.term import Model
 
-__all__ = ["CREDIBLE", "Candidate", "Found", "search", "simulated"]
+__all__ = ["Found", "Option", "search", "sharpened", "simulated"]
 
-MOST = 3  # effects in one set
-CREDIBLE = 20.0  # evidence ratio within which sets cannot be distinguished
-REFITTED = 6  # sets that are refitted in the simulator
-# of twice the log-likelihood by which a linear signature may have misjudged a set, and the share of its gain
-SLACK, BENT = 8.0, 0.05
-# factor on the threshold for every further effect: errors of the simulator grow with the size of the hidden effects
-FURTHER = 1.5
+AROUND = 2  # times that the competition is repeated around its best set
+COVERED, REFITTED = 0.98, 6  # share of the posterior that is refitted, and the most sets
 # share of the best set's gain by which the form of a water law may have misjudged another effect of water
 FORM = 0.3
 UNUSUAL = 3.0  # of its prior's standard deviations, beyond which a value is not listed by a relation alone
-HALF = 0.5  # share of the test's threshold that a set must still gain after refitting
-PER_PARAMETER = 6.0  # of twice the log-likelihood that a further parameter must gain
 
 Tell = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
-    """A refitted set with the ratio of the best set's evidence to its own; `inflation` of the noise's variances.
+class Option:
+    """A set of blocks of the arena and its log evidence; `refit` None where only the linear one was computed."""
 
-    `sharp`: its loss with only a part of the tolerances, in a metric that all candidates share; it distinguishes places
-    of one effect. NaN where it was not computed.
-    """
-
-    refit: Refit
-    evidence_ratio: float
-    inflation: float
-    sharp: float = math.nan
-
-    @property
-    def sd(self) -> FloatArray:
-        """Standard deviations of the values; the drive-to-drive spread is not scaled with the noise. (k,)"""
-        variance = np.diag(self.refit.covariance)
-        days = self.refit.apart**2 if self.refit.apart is not None else np.zeros_like(variance)
-        return np.asarray(np.sqrt((variance - days) * self.inflation + days))
+    members: Members
+    evidence: float
+    refit: Refit | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """`tests`: one for each effect that was looked for, the last one without a finding. `gram` and `calibration` are
-    those of the first test and describe what the log can distinguish. `candidates` best first, empty without a finding.
-    `noises` after the best set. """  # fmt: skip
+    """`gram` (K + 1, K + 1) with tolerances and `calibration` describe what the log can distinguish.
 
-    tests: tuple[Significance, ...]
+    `forms`: unknown forms; if there are any, `arena` and `posterior` are those of all that competes and there are no
+    `options`. Else they are those of known effects, and `options` the sets with what they gain.
+    """
+
+    significance: Significance
     gram: FloatArray
     calibration: Calibration
-    candidates: tuple[Candidate, ...]
-    noises: tuple[Noise, ...]
+    arena: Arena
+    posterior: Posterior
+    forms: tuple[Remainder, ...] = ()
+    options: tuple[Option, ...] = ()
+    road: Road | None = None
 
 
 def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model, tell: Tell) -> Evidence:
@@ -82,7 +76,7 @@ def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model
 
     def tick() -> None:
         done[0] += 1
-        tell("simulating each effect along the drive", 0.02 + 0.28 * done[0] / total)
+        tell("simulating each effect along the drive", 0.02 + 0.38 * done[0] / total)
 
     for d in drives:
         residuals.append(residual(d, model))
@@ -94,240 +88,217 @@ def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model
 def search(
     evidence: Evidence, model: Model, *, level: float, surrogates: int, seed: int, tell: Tell = lambda _t, _s: None
 ) -> Found:
-    """Test, best set, refit; repeated beside that set until the test finds no more or the set has three effects."""
-    tests: list[Significance] = []
-    first: tuple[FloatArray, Calibration] | None = None
-    accepted: tuple[int, ...] = ()
-    candidates: tuple[Candidate, ...] = ()
-    work = evidence
-    while True:
-        tell("testing for any effect" if not accepted else "testing for one more effect", 0.3 + 0.1 * len(tests))
-        gains, gram = largest(work, work.residuals, accepted)
-        if first is not None and (nothing := _surely_nothing(work, gains, first[1], level)) is not None:
-            tests.append(nothing)
-            break
-        sets = best_sets(work, gram, len(accepted) + 1, within=0.0, most=1) if len(accepted) < MOST else []
-        quiet = _after(work, sets[0]) if sets else list(work.residuals)
-        calibration = calibrate(
-            work, quiet, gram, base=accepted, surrogates=surrogates, level=level, seed=seed + len(tests)
-        )
-        tests.append(_tested(work, gains, accepted, calibration, level, surrogates))
-        first = first or (gram, calibration)
-        least = FURTHER * calibration.threshold if accepted else 0.0
-        if tests[-1].p_value > level or tests[-1].statistic < least or not sets:
-            break
-        now = candidates[0].refit if candidates else None
-        found = _refitted(work, gram, accepted, calibration, model, now, tell, 0.35 + 0.1 * len(tests))
-        if not found:
-            break
-        candidates = found
-        best = found[0].refit
-        accepted = tuple(_index(evidence, h) for h in best.members)
-        work = _around(evidence, best, accepted, model)
-        work = replace(work, drives=tuple(led_by(d, best.model) for d in evidence.drives))
-    assert first is not None
-    quiet = list(candidates[0].refit.residuals) if candidates else list(evidence.residuals)
-    noises = tuple(fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, evidence.drives, strict=True))
-    return Found(tuple(tests), first[0], first[1], candidates, noises)
+    """Unknown forms and known effects in one competition; without a form, known effects alone, refitted.
 
-
-def _tested(
-    evidence: Evidence, gains: FloatArray, base: Sequence[int], c: Calibration, level: float, surrogates: int
-) -> Significance:
-    sizes = np.array([len(x) for x in evidence.columns], dtype=np.float64)
-    ratio = gains / c.inflation / sizes
-    statistic = float(ratio.max())
-    if c.maxima.size:
-        p = max(gumbel_p(c.maxima, statistic), chance(statistic, c.tested), 1e-12)
-        return Significance(statistic, c.threshold, p, level, c.achieved, surrogates)
-    p = max(chance(statistic, c.tested), 1e-12)
-    return Significance(statistic, c.threshold, p, level, float("nan"), 0)
-
-
-def _surely_nothing(evidence: Evidence, gains: FloatArray, c: Calibration, level: float) -> Significance | None:
-    """The test's result if no gain reaches Bonferroni's bound [bonferroni1936], even without coloured noise.
-
-    The bound is the minimum of every threshold. Surrogates, which take most of the time, could not turn this into a
-    finding.
+    Effects are asked for only if the test for any effect finds more than chance at this `level`.
     """
-    statistic = float((gains / [len(x) for x in evidence.columns]).max())
-    p = chance(statistic, c.tested)
-    if p <= level:
-        return None
-    return Significance(statistic, bonferroni(level, c.tested), p, level, c.achieved, 0)
+    tell("known effects against unknown forms", 0.45)
+    arena = make_arena(evidence, model)
+    posterior = compete(arena)
+    k = np.r_[np.arange(evidence.count), -1]
+    scale = np.append(arena.sd[: evidence.count], 1.0)
+    plain = posterior.gram[np.ix_(k, k)] / np.outer(scale, scale)
+    gram = tolerant(evidence, plain)
+    calibration = calibrate(evidence, plain, surrogates=surrogates, level=level, seed=seed)
+    test = tested(evidence, gram, calibration, level)
+    forms = unknown_forms(arena, posterior, seed=seed)
+    if forms:
+        return Found(test, gram, calibration, arena, posterior, forms, road=road_of(arena, posterior, seed=seed))
+    tell("known effects", 0.6)
+    road = road_of(arena, posterior, seed=seed)
+    if test.p_value > level:
+        return Found(test, gram, calibration, arena, posterior, road=road)
+    arena = known_only(arena, roads_in(arena, posterior))
+    posterior = compete(arena)
+    arena, posterior = _repeated(evidence, arena, posterior, model)
+    tell("refitting in the simulator", 0.7)
+    options = _refitted(evidence, arena, posterior, model)
+    options = sorted(options, key=lambda o: -o.evidence)
+    return Found(test, gram, calibration, arena, posterior, (), tuple(options), road)
 
 
-def _after(evidence: Evidence, fit: SetFit) -> list[FloatArray]:
-    return [
-        r - np.tensordot(fit.theta, s[list(fit.columns)], axes=1)
-        for r, s in zip(evidence.residuals, evidence.signatures, strict=True)
-    ]
+def _effects(arena: Arena, members: Members) -> list[int]:
+    """Hypotheses of a set."""
+    return [arena.blocks[m].tag for m in members]
 
 
-def _refitted(
-    evidence: Evidence,
-    gram: FloatArray,
-    base: Sequence[int],
-    calibration: Calibration,
-    model: Model,
-    now: Refit | None,
-    tell: Tell,
-    share: float,
-) -> tuple[Candidate, ...]:
-    """Sets of one effect more than `base`, refitted in the simulator, best first; those at a physical bound are out.
+def _start(arena: Arena, posterior: Posterior, members: Members) -> FloatArray:
+    """Linear values of a set's effects, as changes. (k,)"""
+    fit = fitted(arena, posterior.tolerant, members)
+    columns = [c for m in members for c in arena.blocks[m].columns]
+    return np.asarray(fit.mean[[fit.columns.index(c) for c in columns]] * arena.sd[columns])
 
-    None if the best of them gains less over the known set `now` than the test requires: the finding then does not have
-    the form of any effect.
+
+def _repeated(
+    evidence: Evidence, arena: Arena, posterior: Posterior, model: Model
+) -> tuple[Arena, Posterior]:  # fmt: skip
+    """The competition around its own best set, until that stays the same."""
+    done: list[int] = []
+    for _ in range(AROUND):
+        best = _effects(arena, posterior.best)
+        if not best or best == done:
+            break
+        measure = metric(arena, posterior.weighings)
+        found = refit(evidence, best, _start(arena, posterior, posterior.best), measure, model)
+        if found is None or found.at_bound:
+            break
+        arena, done = _around(arena, found, best, model), best
+        posterior = compete(arena)
+    return arena, posterior
+
+
+def _off(r: Refit, model: Model) -> FloatArray:
+    """Changes of a refitted set's values. (k,)"""
+    return np.asarray(r.values - [value_in(model, r.members[i], n) for i, n in r.names])
+
+
+def _around(arena: Arena, found: Refit, chosen: Sequence[int], model: Model) -> Arena:
+    """The arena with a set's signatures at its own values.
+
+    Residuals are those that a linear model around these values would have had at the start, so that the competition can
+    begin again from there.
     """
-    size = len(base) + 1
-    top = best_sets(evidence, gram, size, within=0.0, most=1)
-    if not top:
-        return ()
-    inflation = max(1.0, float(np.mean([calibration.inflation[m] for m in top[0].members])))
-    noises = noises_after(evidence, evidence.residuals, dict(zip(top[0].columns, top[0].theta.tolist(), strict=True)))
-    known = fit_set(evidence, gram, base) if base else None
-    won = top[0].gain - (known.gain if known is not None else 0.0)
-    within = (2.0 * math.log(CREDIBLE)) * inflation + SLACK + BENT * max(won, 0.0)
-    fits = best_sets(evidence, gram, size, within=within, most=REFITTED)
-    fits += _twins(evidence, gram, fits[0], {f.members for f in fits})
-    if size == 1:
-        fits += _of_water(evidence, gram, {f.members for f in fits})
-    measure = metric(evidence, noises)
-    tell("refitting in the simulator", min(share, 0.95))
-    with ThreadPoolExecutor(THREADS) as pool:
-        refits = list(pool.map(lambda fit: refit(evidence, fit, measure, model), fits))
-    done = [r for r in refits if r is not None and not r.at_bound]
-    losses = {id(r): r.loss / inflation + PER_PARAMETER * len(r.values) for r in done}
-    done.sort(key=lambda r: losses[id(r)])
-    large = [r for r in done if _all_there(r, model)]
-    if base and not large:
-        return ()
-    # a set with a member too small to be named is dropped if another effect explains as much
-    if large and losses[id(large[0])] - losses[id(done[0])] < 2.0 * math.log(CREDIBLE):
-        done = large
-    y = whitened_residual(evidence, noises, now.residuals if now is not None else evidence.residuals)[None]
-    # the penalty of known values is in the loss of every set that has them
-    known_loss = float(measure.inner(y, y)[0, 0]) + (now.unlikely if now is not None else 0.0)
-    if known is not None and (again := refit(evidence, known, measure, model)) is not None:
-        known_loss = min(known_loss, again.loss)
-    if not done or known_loss - done[0].loss < HALF * calibration.threshold * inflation:
-        return ()
-    best = done[0]
-    members = next(f.members for f, own in zip(fits, refits, strict=True) if own is best)
-    for fit, same in _imitated(evidence, gram, members, measure, model):
-        # the relation holds on every log: that it takes more effects, in these sizes, is no evidence against it
-        fits.append(fit)
-        refits.append(same)
-        done.append(same)
-        worse = (same.loss - same.unlikely) - (best.loss - best.unlikely)
-        losses[id(same)] = losses[id(best)] + max(worse, 0.0) / inflation
-    done.sort(key=lambda r: losses[id(r)])
-    wet = (known_loss - done[0].loss) / inflation if _about_water(done[0]) else 0.0
-    behind = [losses[id(r)] - losses[id(done[0])] - (FORM * wet if _about_water(r) else 0.0) for r in done]
-    ratios = [math.exp(min(0.5 * max(x, 0.0), 700.0)) for x in behind]
-    credible = [(r, x) for r, x in zip(done, ratios, strict=True) if x < CREDIBLE]
-    starts = [_at(next(f for f, own in zip(fits, refits, strict=True) if own is r), r, model) for r, _ in credible]
+    columns = [c for h in chosen for c in arena.evidence.columns[h]]
+    parts = []
+    for p in arena.parts:
+        own = found.signatures[p.drive][..., p.at]
+        changed = p.signatures.copy()
+        changed[columns] = own
+        at_start = found.residuals[p.drive][:, p.at] + np.tensordot(_off(found, model), own, axes=1)
+        parts.append(replace(p, signatures=changed, residual=at_start))
+    return replace(arena, parts=tuple(parts))
 
-    def sharpened(start: SetFit, found: Refit) -> Refit | None:
-        led = replace(evidence, drives=tuple(led_by(d, found.model) for d in evidence.drives))
-        return refit(led, start, metric(evidence, noises, share=KNOWN, beside=start.columns), model)
+
+def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Model) -> list[Option]:
+    """The sets of the posterior; those that hold most of it, twins, relations and effects of water are refitted."""
+    linear = dict(posterior.sets)
+    chosen: list[Members] = []
+    total = 0.0
+    for (members, _), q in zip(posterior.sets, posterior.probability.tolist(), strict=True):
+        if total < COVERED and len(chosen) < REFITTED:
+            chosen.append(members)
+        total += q
+    best = posterior.best
+    by_hypothesis = {b.tag: i for i, b in enumerate(arena.blocks)}
+    equal: set[Members] = set()
+
+    def as_blocks(own: Sequence[int]) -> Members:
+        return tuple(sorted(by_hypothesis[h] for h in own)) if all(h in by_hypothesis for h in own) else ()
+
+    chosen += [as_blocks(own) for own in _twins(evidence, _effects(arena, best)) + _of_water(evidence)]
+    for own in imitations(evidence.asked, _effects(arena, best)):
+        if compatible(evidence, own):
+            equal.add(as_blocks(own))
+    chosen = [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m]
+    measure = metric(arena, posterior.weighings)
+    y = measure.rows([r[None] for r in evidence.residuals])
+    nothing = 0.5 * float(measure.inner(y, y)[0, 0])
+
+    def one(members: Members) -> Option | None:
+        own = _effects(arena, members)
+        found = refit(evidence, own, _start(arena, posterior, members), measure, model)
+        if found is None or found.at_bound:
+            return None
+        return Option(members, nothing + _evidence(arena, found, own, measure, model), found)
 
     with ThreadPoolExecutor(THREADS) as pool:
-        sharp = list(pool.map(sharpened, starts, (r for r, _ in credible)))
-    known_only = metric(evidence, noises, share=KNOWN)
-
-    def as_candidate(r: Refit, ratio: float) -> Candidate:
-        y = whitened_residual(evidence, noises, r.residuals)[None]
-        return Candidate(r, ratio, inflation, float(known_only.inner(y, y)[0, 0]) + r.unlikely)
-
-    return tuple(
-        as_candidate(s if s is not None and not s.at_bound else r, x) for (r, x), s in zip(credible, sharp, strict=True)
-    )
+        done = dict(zip(chosen, pool.map(one, chosen), strict=True))
+    out = {m: o for m, o in done.items() if o is not None} | {(): Option((), 0.0)}
+    if best in out and best:
+        # what the simulator says more or less of the best set than its signatures, it would say of the others too
+        shift = out[best].evidence - linear[best]
+        out |= {m: Option(m, e + shift) for m, e in linear.items() if m not in done and m}
+    return _levelled(evidence, arena, out, best, equal, model)
 
 
-def _twins(evidence: Evidence, gram: FloatArray, top: SetFit, known: set[tuple[int, ...]]) -> list[SetFit]:
-    """The best set with one member replaced by its known twin: always refitted, whatever their signatures predict."""
+def _levelled(
+    evidence: Evidence, arena: Arena, options: dict[Members, Option], best: Members, equal: set[Members], model: Model
+) -> list[Option]:
+    """Options whose evidence does not rest on what no log shows, or no law of water knows.
+
+    A relation holds on every log: that it takes more effects, in these sizes, is no evidence against it. Near floating,
+    slip is proportional to one over the square of the remaining contact: the form of the law decides, which nobody has.
+    """
+    top = options.get(best)
     out = []
-    for k, m in enumerate(top.members):
+    for members, o in options.items():
+        gained = o.evidence
+        if members in equal and o.refit is not None:
+            if top is None or top.refit is None or not _plausible(o.refit, model):
+                continue
+            worse = (o.refit.loss - o.refit.unlikely) - (top.refit.loss - top.refit.unlikely)
+            gained = top.evidence - 0.5 * max(worse, 0.0)
+        elif top is not None and _about_water(evidence, arena, members) and _about_water(evidence, arena, best):
+            gained = min(top.evidence, o.evidence + FORM * max(top.evidence, 0.0)) if members != best else o.evidence
+        out.append(replace(o, evidence=gained))
+    return out
+
+
+def _evidence(arena: Arena, found: Refit, own: Sequence[int], measure: Metric, model: Model) -> float:
+    """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values."""
+    columns = [c for h in own for c in arena.evidence.columns[h]]
+    J = measure.rows(found.signatures) * arena.sd[columns, None]
+    y = measure.rows([r[None] for r in found.residuals])[0] + (_off(found, model) / arena.sd[columns]) @ J
+    rows = np.concatenate([J, y[None]])
+    state = start(measure.inner(rows, rows))
+    at = 0
+    by_tag = {b.tag: b for b in arena.blocks}
+    loss = 0.5 * float(state.inner[-1, -1])
+    for i, h in enumerate(own):
+        b = by_tag[h]
+        state = added(state, i, replace(b, columns=tuple(range(at, at + len(b.columns)))))
+        at += len(b.columns)
+    return state.evidence - loss
+
+
+def _twins(evidence: Evidence, own: Sequence[int]) -> list[tuple[int, ...]]:
+    """The set with one member replaced by its known twin: always refitted, whatever their signatures predict."""
+    out = []
+    for k, m in enumerate(own):
         for name in evidence.asked[m].effect.twins:
             for i, h in enumerate(evidence.asked):
-                if h.effect.name != name or h.where not in (None, h.effect.default):
-                    continue
-                members = tuple(sorted((*top.members[:k], i, *top.members[k + 1 :])))
-                fit = fit_set(evidence, gram, members) if len(set(members)) == len(members) else None
-                if fit is not None and members not in known and compatible(evidence, members):
-                    known = known | {members}
-                    out.append(fit)
+                members = tuple(sorted((*own[:k], i, *own[k + 1 :])))
+                at_usual_place = h.effect.name == name and h.where in (None, h.effect.default)
+                if at_usual_place and len(set(members)) == len(members) and compatible(evidence, members):
+                    out.append(members)
     return out
 
 
-def _of_water(evidence: Evidence, gram: FloatArray, known: set[tuple[int, ...]]) -> list[SetFit]:
-    """Effects of water on the whole car or a side: refitted on every wet log, whatever the signatures predict.
-
-    Near floating, slip is proportional to one over the square of the remaining contact, so a linear signature is valid
-    only locally.
-    """
-    alone = [
-        (i,) for i, h in enumerate(evidence.asked)
-        if h.of_water and not h.allowed and h.where not in AXLES and (i,) not in known
+def _of_water(evidence: Evidence) -> list[tuple[int, ...]]:
+    """Effects of water on the whole car or a side: refitted on every wet log, whatever the signatures predict."""
+    return [
+        (i,) for i, h in enumerate(evidence.asked) if h.of_water and not h.allowed and h.where not in AXLES
     ]  # fmt: skip
-    return [f for m in alone if (f := fit_set(evidence, gram, m)) is not None]
 
 
-def _about_water(r: Refit) -> bool:
-    return any(h.of_water for h in r.members)
+def _about_water(evidence: Evidence, arena: Arena, members: Members) -> bool:
+    return any(evidence.asked[h].of_water for h in _effects(arena, members))
 
 
-def _imitated(
-    evidence: Evidence, gram: FloatArray, members: Sequence[int], measure: Metric, model: Model
-) -> list[tuple[SetFit, Refit]]:
-    """Refits of the sets that a relation makes equal to the best one, without those at a physical bound."""
-    out = []
-    for other in imitations(evidence.asked, members):
-        fit = fit_set(evidence, gram, other) if len(other) <= MOST else None
-        same = refit(evidence, fit, measure, model) if fit is not None and compatible(evidence, other) else None
-        if fit is not None and same is not None and not same.at_bound and _all_there(same, model) and _usual(same):
-            out.append((fit, same))
-    return out
-
-
-def _usual(r: Refit) -> bool:
-    """Whether every value stays within three times its usual size; a huge offset is not a plausible rival."""
-    own = [(r.members[i].parameter(n), v) for (i, n), v in zip(r.names, r.values.tolist(), strict=True)]
-    return all(abs(v - p.neutral) <= UNUSUAL * p.sigma for p, v in own)
-
-
-def _at(fit: SetFit, r: Refit, model: Model) -> SetFit:
-    """The set at refitted values, as a start."""
-    base = np.array([value_in(model, r.members[i], n) for i, n in r.names])
-    return replace(fit, theta=r.values - base)
-
-
-def _all_there(r: Refit, model: Model) -> bool:
-    """Whether every value is worth naming."""
+def _plausible(r: Refit, model: Model) -> bool:
+    """Whether every value is worth naming and within three times its usual size: a huge offset is no likely rival."""
+    off = _off(r, model)
+    own = [(r.members[i], r.members[i].parameter(n), n) for i, n in r.names]
     return all(
-        abs(v - value_in(model, r.members[i], n)) >= r.members[i].worth_naming(n)
-        for (i, n), v in zip(r.names, r.values.tolist(), strict=True)
+        abs(x) >= h.worth_naming(n) and abs(v - p.neutral) <= UNUSUAL * p.sigma
+        for (h, p, n), v, x in zip(own, r.values.tolist(), off.tolist(), strict=True)
     )
 
 
-def _index(evidence: Evidence, h: Hypothesis) -> int:
-    return evidence.asked.index(h)
+def sharpened(found: Found, option: Option, model: Model) -> tuple[Refit | None, float]:
+    """An option's values with only a part of the tolerances, and its loss there: it distinguishes places of one effect.
 
-
-def _around(evidence: Evidence, best: Refit, members: Sequence[int], model: Model) -> Evidence:
-    """The evidence with the signatures of the best set at its own values.
-
-    Residuals are those that a linear model around these values would have had at the start, so that the search for sets
-    can begin again from there.
+    All tolerances together can hide a wrong place: the form of a tyre's curve absorbs a difference between left and
+    right wheel.
     """
-    columns = [c for m in members for c in evidence.columns[m]]
-    start = best.values - np.array([value_in(model, best.members[i], n) for i, n in best.names])
-    new_signatures, new_residuals = [], []
-    for s, r, own in zip(evidence.signatures, best.residuals, best.signatures, strict=True):
-        changed = s.copy()
-        changed[columns] = own
-        new_signatures.append(changed)
-        new_residuals.append(r + np.tensordot(start, own, axes=1))
-    prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(new_signatures, evidence.drives, strict=True))
-    return replace(evidence, residuals=tuple(new_residuals), signatures=tuple(new_signatures), prepared=prepared)
+    if option.refit is None:
+        return None, math.nan
+    evidence, own = found.arena.evidence, _effects(found.arena, option.members)
+    columns = [c for h in own for c in evidence.columns[h]]
+    led = replace(evidence, drives=tuple(led_by(d, option.refit.model) for d in evidence.drives))
+    measure = metric(found.arena, found.posterior.weighings, share=KNOWN, beside=columns)
+    again = refit(led, own, _off(option.refit, model), measure, model)
+    best = option.refit if again is None or again.at_bound else again
+    known = metric(found.arena, found.posterior.weighings, share=KNOWN)
+    y = known.rows([r[None] for r in best.residuals])
+    return best, float(known.inner(y, y)[0, 0]) + best.unlikely

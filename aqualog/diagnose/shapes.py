@@ -33,10 +33,11 @@ class Mechanism:
     usual: float
     allowed: float
     over: tuple[tuple[str, ...], ...]
+    is_road: bool = False  # every road has it: no unknown form
 
 
-_CAR = (("v_x",), ("torque",), ("a_y",), ("water_depth",), ("ambient_temperature",), ("position",), ("t",),
-        ("v_x", "torque"), ("v_x", "water_depth"))  # fmt: skip
+_CAR = (("v_x",), ("torque",), ("a_y",), ("steer_angle",), ("water_depth",), ("ambient_temperature",),
+        ("position",), ("t",), ("v_x", "torque"), ("v_x", "water_depth"))  # fmt: skip
 _SENSOR = (("v_x",), ("a_x",), ("t",), ("ambient_temperature",))
 _SLIP = (("torque",), ("v_x",), ("t",), ("a_y",), ("water_depth",))
 MECHANISMS: tuple[Mechanism, ...] = (
@@ -71,7 +72,10 @@ MECHANISMS: tuple[Mechanism, ...] = (
         "lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.1,
         (("v_x",), ("t",)),
     ),
-    Mechanism("road", "the slope of the road", "road_grade", "rad", 0.015, 0.0, (("position",),)),
+    Mechanism("road", "the slope of the road", "road_grade", "rad", 0.015, 0.0, (("position",),), is_road=True),
+    Mechanism(
+        "bank", "the bank of the road", "accelerometer_bias@a_y", "m/s^2", 0.2, 0.0, (("position",),), is_road=True,
+    ),
 )  # fmt: skip
 
 
@@ -108,9 +112,9 @@ def shapes(coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, ha
         for names in m.over:
             if not all(n in coordinates for n in names):
                 continue
-            key = ("road" if m.name == "road" else "", names)
+            key = ("road" if m.is_road else "", names)
             if key not in made:
-                made[key] = basis(names, [coordinates[n] for n in names], mask, dt, is_road=m.name == "road")
+                made[key] = basis(names, [coordinates[n] for n in names], mask, dt, is_road=m.is_road)
             found = made[key]
             if found is not None:
                 out.append(Shape(m, names, found))
