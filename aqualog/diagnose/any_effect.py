@@ -13,7 +13,7 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.evidence import Evidence, tolerant
 from aqualog.diagnose.records import Significance
 
-__all__ = ["Calibration", "bonferroni", "calibrate", "chance", "gains_of", "gumbel_p", "tested"]
+__all__ = ["Calibration", "bonferroni", "calibrate", "chance", "gains_of", "gumbel_p", "significance"]
 
 SINGULAR = 1e-3  # share of a column's energy that the others of its hypothesis must leave
 ALIKE = 0.97  # cosine of whitened signatures from which one stands for both in the draws
@@ -85,7 +85,7 @@ def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: 
     return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()), len(leaders))
 
 
-def tested(evidence: Evidence, gram: FloatArray, c: Calibration, level: float) -> Significance:
+def significance(evidence: Evidence, gram: FloatArray, c: Calibration, level: float) -> Significance:
     """The test on inner products (K + 1, K + 1) that forgive the tolerances."""
     statistic = float((gains_of(evidence, gram) / c.inflation / _sizes(evidence)).max())
     bound = max(chance(statistic, c.tested), 1e-12)

@@ -10,7 +10,7 @@ import numpy as np
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
-from aqualog.diagnose.competition import Block, State, added, scored, start, values
+from aqualog.diagnose.competition import COARSE, SCALES, Block, State, added, scored, start, values
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
 
@@ -20,10 +20,12 @@ WIDTH = 8  # sets that are carried on
 MOST = 4  # blocks in one set
 SWAPPED = 3  # sets in which every member is exchanged
 FEW = 4  # first candidates in each metric after which the noise is tried
-ROUNDS = 3  # of noise after the best set
+CLEARLY = 1.0  # [nats] that a noise must make the measurement more likely
+ROUNDS = 3  # of noise after the best set so far
 DIES = 6.0  # [nats] behind the best set, at which a level of larger sets ends the search
 SINGULAR = 1e-3  # share of a column's energy that the others of its set must leave
 SMALLEST = 1e-12
+BEYOND = 2.0  # standard deviations by which a value may be beyond a physical bound
 OPTIMISM = 1.5  # [nats] a column by which noise after a fit is too likely
 
 Members = tuple[int, ...]
@@ -31,7 +33,7 @@ Members = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Posterior:
-    """`sets` by evidence with their prior, best first, and `probability` of each; `gram` plain and `tolerant`."""
+    """`sets` by evidence with their prior, best first, and `probability` of each; `gram` plain and `tolerant`, which is coarsened."""
 
     sets: tuple[tuple[Members, float], ...]
     probability: FloatArray
@@ -69,35 +71,49 @@ def fitted(arena: Arena, tolerant: FloatArray, members: Sequence[int]) -> Fitted
 def compete(arena: Arena) -> Posterior:
     """The posterior over the sets that a search with swaps visits.
 
-    The noise is that under which the measurement is most likely, after no block or after one of the first candidates
-    in the metrics of coloured and of white noise. It is estimated again after the best set.
+    The noise is that under which the measurement is most likely: after no block, after the best set so far, or after
+    one of the first candidates beside it in the metrics of coloured and of white noise. Else a slow effect would count
+    as noise and could not be found.
     """
-    plain = [p.residual for p in arena.parts]
-    weighings = arena.weighed(plain)
+    weighings = arena.weighed([p.residual for p in arena.parts])
+    white = arena.tolerant(COARSE * arena.white())
+    sets: dict[Members, float] = {(): 0.0}
+    best: Members = ()
     least = _surprise(weighings)
-    after: Members = ()
-    gram = arena.inner(weighings)
-    tolerant = arena.tolerant(gram)
-    first = weighings
-    for metric in (tolerant, arena.tolerant(arena.white())):
-        for m in _first(arena, metric):
-            again = arena.weighed(_left(arena, metric, (m,)))
-            price = OPTIMISM * len(arena.blocks[m].columns)
-            if _surprise(again) + price < least:
-                least, weighings, after = _surprise(again) + price, again, (m,)
-    for _ in range(ROUNDS):
-        if weighings is not first:
-            gram = arena.inner(weighings)
-            tolerant = arena.tolerant(gram)
+    gram, tolerant = _inner(arena, weighings)
+    tried: set[Members] = {()}
+    for k in range(ROUNDS + 1):
+        quieter = _quieter(arena, best, (tolerant, white), least, tried)
+        if quieter is not None:
+            least, weighings = quieter
+            gram, tolerant = _inner(arena, weighings)
+        elif k > 0:
+            break
         sets = _searched(arena, gram, tolerant)
-        best = max(sets, key=lambda k: sets[k])
-        if not best or set(best) == set(after):
-            break
-        again = arena.weighed(_left(arena, tolerant, best))
-        if _surprise(again) >= _surprise(weighings) - 1.0:
-            break
-        weighings, after = again, best
+        best = max(sets, key=lambda m: sets[m])
     return _posterior(arena, sets, gram, tolerant, weighings)
+
+
+def _inner(arena: Arena, weighings: Sequence[Weighing]) -> tuple[FloatArray, FloatArray]:
+    gram = arena.inner(weighings)
+    return gram, arena.tolerant(COARSE * gram)
+
+
+def _quieter(
+    arena: Arena, best: Members, metrics: Sequence[FloatArray], least: float, tried: set[Members]
+) -> tuple[float, tuple[Weighing, ...]] | None:
+    """Noise after the best set, or after one block more, under which the measurement is clearly more likely."""
+    found = None
+    for metric in metrics:
+        for members in (best, *(tuple(sorted((*best, m))) for m in _first(arena, metric, best))):
+            if members in tried:
+                continue
+            tried.add(members)
+            again = arena.weighed(_left(arena, metric, members))
+            size = sum(len(arena.blocks[m].columns) for m in members)
+            if _surprise(again) + OPTIMISM * size < least - CLEARLY:
+                least, found = _surprise(again) + OPTIMISM * size, again
+    return None if found is None else (least, found)
 
 
 def _posterior(
@@ -121,11 +137,15 @@ def _surprise(weighings: Sequence[Weighing]) -> float:
     return sum(w.surprise for w in weighings)
 
 
-def _first(arena: Arena, metric: FloatArray) -> list[int]:
-    """The few blocks that gain most alone."""
+def _first(arena: Arena, metric: FloatArray, beside: Members) -> list[int]:
+    """The few blocks that gain most beside a set."""
     state = start(metric)
+    for m in beside:
+        state = added(state, m, arena.blocks[m])
     gains = [
-        (scored(state, b)[0] + b.log_prior, i) for i, b in enumerate(arena.blocks) if _shows(arena, state, b, metric)
+        (scored(state, b)[0] + b.log_prior, i)
+        for i, b in enumerate(arena.blocks)
+        if i not in beside and _shows(arena, state, b, metric)
     ]
     return [i for gain, i in sorted(gains, reverse=True)[:FEW] if gain > 0.0]
 
@@ -199,13 +219,12 @@ def _may_join(arena: Arena, gram: FloatArray, state: State, block: Block) -> boo
 
 
 def _shows(arena: Arena, state: State, block: Block, tolerant: FloatArray) -> bool:
-    """Whether a set leaves enough of a single column, and its value is within its bounds."""
-    if len(block.columns) > 1:
-        return True
-    c, A = block.columns[0], state.inner
-    if A[c, c] < max(SINGULAR * tolerant[c, c], SMALLEST):
+    """Whether a set leaves enough of a single column, and the values are not clearly beyond their bounds."""
+    c, A = list(block.columns), state.inner
+    if len(c) == 1 and A[c[0], c[0]] < max(SINGULAR * tolerant[c[0], c[0]], SMALLEST):
         return False
     if block.low is None or block.high is None:
         return True
-    value = A[c, -1] / A[c, c]
-    return bool(block.low[0] <= value <= block.high[0])
+    cov = np.linalg.inv(A[np.ix_(c, c)] + np.linalg.inv(SCALES[-1] ** 2 * block.prior))
+    value, reach = cov @ A[c, -1], BEYOND * np.sqrt(np.diag(cov))
+    return bool(np.all(value >= block.low - reach) and np.all(value <= block.high + reach))

@@ -101,6 +101,8 @@ def conclude(found: Found, model: Model) -> Outcome:
     small = _small([c for c, is_large in best.causes if not is_large]) + _other_places(best, ranked[0])
     chosen = best.option.refit
     failed = repeats(chosen, found.arena, [w.noise for w in found.posterior.weighings], model) if chosen else ()
+    if chosen is not None and chosen.at_bound:
+        failed = (*failed, "a value stands at its physical bound.")
     unsure = frozenset(c.effect for c in own if c.probability < SURE)
     if not unsure and not failed:
         verdict: Verdict = "named" if len(own) == 1 else "compound"

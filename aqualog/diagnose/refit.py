@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -55,7 +56,8 @@ class Refit:
 class Metric:
     """Inner products under noise and tolerances: u' (I - A' M A) w for whitened rows; `A` (k, N), `M` (k, k).
 
-    `apart` (K,): standard deviations that are not in the metric and are added to those of the values found.
+    `apart` (K,): standard deviations that are not in the metric and are added to those of the values found; `coarse`:
+    share of the log-likelihood that counts.
     """
 
     parts: tuple[Part, ...]
@@ -63,11 +65,12 @@ class Metric:
     A: FloatArray
     M: FloatArray
     apart: FloatArray
+    coarse: float = 1.0
 
     def rows(self, each: Sequence[FloatArray]) -> FloatArray:
         """Arrays (k, C, n) of each drive as rows (k, N)."""
         found = [w.rows(each[p.drive][..., p.at]) for p, w in zip(self.parts, self.weighings, strict=True)]
-        return np.concatenate(found, axis=1)
+        return math.sqrt(self.coarse) * np.concatenate(found, axis=1)
 
     def inner(self, u: FloatArray, w: FloatArray) -> FloatArray:
         """Inner products of rows (a, N) and (b, N): (a, b)."""
@@ -75,7 +78,8 @@ class Metric:
 
 
 def metric(
-    arena: Arena, weighings: Sequence[Weighing], *, share: float = 1.0, beside: Sequence[int] = ()
+    arena: Arena, weighings: Sequence[Weighing], *, share: float = 1.0, beside: Sequence[int] = (),
+    coarse: float = 1.0,
 ) -> Metric:  # fmt: skip
     """Inner products under noise and a share of the tolerances, as in `Arena.tolerant`.
 
@@ -104,8 +108,9 @@ def metric(
         columns = [p.signatures[k] * sd[k, None, None]]
         columns += [np.tensordot(np.linalg.cholesky(b.prior).T, arena.drawn(i, b), axes=1) for b in arena.forgiven]
         pieces.append(w.rows(np.concatenate(columns)))
-    A = np.concatenate(pieces, axis=1)
-    return Metric(arena.parts, tuple(weighings), A, np.asarray(np.linalg.inv(np.eye(len(A)) + A @ A.T)), apart)
+    A = math.sqrt(coarse) * np.concatenate(pieces, axis=1)
+    M = np.asarray(np.linalg.inv(np.eye(len(A)) + A @ A.T))
+    return Metric(arena.parts, tuple(weighings), A, M, apart, coarse)
 
 
 def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure: Metric, model: Model) -> Refit | None:

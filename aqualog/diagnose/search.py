@@ -16,10 +16,10 @@ import numpy as np
 
 from aqualog.core.notation import AXLES
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.any_effect import Calibration, calibrate, tested
+from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import Arena, known_only, make_arena
 from aqualog.diagnose.compete import Members, Posterior, compete, fitted
-from aqualog.diagnose.competition import added, start
+from aqualog.diagnose.competition import COARSE, added, start
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.evidence import Evidence, make_evidence, tolerant
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
@@ -100,7 +100,7 @@ def search(
     plain = posterior.gram[np.ix_(k, k)] / np.outer(scale, scale)
     gram = tolerant(evidence, plain)
     calibration = calibrate(evidence, plain, surrogates=surrogates, level=level, seed=seed)
-    test = tested(evidence, gram, calibration, level)
+    test = significance(evidence, gram, calibration, level)
     forms = unknown_forms(arena, posterior, seed=seed)
     if forms:
         return Found(test, gram, calibration, arena, posterior, forms, road=road_of(arena, posterior, seed=seed))
@@ -190,16 +190,16 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
         if compatible(evidence, own):
             equal.add(as_blocks(own))
     chosen = [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m]
-    measure = metric(arena, posterior.weighings)
+    measure = metric(arena, posterior.weighings, coarse=COARSE)
     y = measure.rows([r[None] for r in evidence.residuals])
     nothing = 0.5 * float(measure.inner(y, y)[0, 0])
 
     def one(members: Members) -> Option | None:
         own = _effects(arena, members)
         found = refit(evidence, own, _start(arena, posterior, members), measure, model)
-        if found is None or found.at_bound:
+        if found is None or _is_nothing(found, model):
             return None
-        return Option(members, nothing + _evidence(arena, found, own, measure, model), found)
+        return Option(members, _evidence(arena, found, own, measure, model, nothing), found)
 
     with ThreadPoolExecutor(THREADS) as pool:
         done = dict(zip(chosen, pool.map(one, chosen), strict=True))
@@ -234,8 +234,18 @@ def _levelled(
     return out
 
 
-def _evidence(arena: Arena, found: Refit, own: Sequence[int], measure: Metric, model: Model) -> float:
-    """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values."""
+def _is_nothing(r: Refit, model: Model) -> bool:
+    """Whether a value stands at a bound that means no effect: a trailer of no mass."""
+    return r.at_bound and bool(np.any(np.abs(_off(r, model)) < 1e-12))
+
+
+def _evidence(
+    arena: Arena, found: Refit, own: Sequence[int], measure: Metric, model: Model, nothing: float
+) -> float:  # fmt: skip
+    """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values.
+
+    `nothing`: half the sum of squares without any effect.
+    """
     columns = [c for h in own for c in arena.evidence.columns[h]]
     J = measure.rows(found.signatures) * arena.sd[columns, None]
     y = measure.rows([r[None] for r in found.residuals])[0] + (_off(found, model) / arena.sd[columns]) @ J
@@ -248,7 +258,7 @@ def _evidence(arena: Arena, found: Refit, own: Sequence[int], measure: Metric, m
         b = by_tag[h]
         state = added(state, i, replace(b, columns=tuple(range(at, at + len(b.columns)))))
         at += len(b.columns)
-    return state.evidence - loss
+    return state.evidence + nothing - loss
 
 
 def _twins(evidence: Evidence, own: Sequence[int]) -> list[tuple[int, ...]]:

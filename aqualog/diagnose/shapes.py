@@ -70,11 +70,12 @@ MECHANISMS: tuple[Mechanism, ...] = (
     ),
     Mechanism(
         "lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.1,
-        (("v_x",), ("t",)),
+        (("v_x",),),
     ),
     Mechanism("road", "the slope of the road", "road_grade", "rad", 0.015, 0.0, (("position",),), is_road=True),
     Mechanism(
-        "bank", "the bank of the road", "accelerometer_bias@a_y", "m/s^2", 0.2, 0.0, (("position",),), is_road=True,
+        "bank", "the bank of the road", "accelerometer_bias@a_y", "m/s^2", 0.2, 0.0, (("position",), ("t",)),
+        is_road=True,
     ),
 )  # fmt: skip
 
@@ -112,9 +113,10 @@ def shapes(coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, ha
         for names in m.over:
             if not all(n in coordinates for n in names):
                 continue
-            key = ("road" if m.is_road else "", names)
+            is_fine = m.is_road and names == ("position",)
+            key = ("road" if is_fine else "", names)
             if key not in made:
-                made[key] = basis(names, [coordinates[n] for n in names], mask, dt, is_road=m.is_road)
+                made[key] = basis(names, [coordinates[n] for n in names], mask, dt, is_road=is_fine)
             found = made[key]
             if found is not None:
                 out.append(Shape(m, names, found))

@@ -19,7 +19,7 @@ from aqualog.diagnose.unknown_term import describe
 
 __all__ = ["evidence_of", "unknown_forms"]
 
-AHEAD = 5.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
+AHEAD = 3.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
 WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
 LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what it explains, by the channel's unit
@@ -31,7 +31,7 @@ DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points
 def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
     """Shapes of the best set that no known effect replaces, what explains most first; empty if none is that clear.
 
-    A mechanism counts if its share of the posterior is 0.95, the best set is e^5 times as likely as every set of known
+    A mechanism counts if its share of the posterior is 0.95, the best set is e^3 times as likely as every set of known
     effects, and it explains a fifth of what the set explains and 5 % of a channel's variance.
     """
     blocks = arena.blocks

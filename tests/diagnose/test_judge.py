@@ -1,57 +1,15 @@
-"""The verdict with probabilities, and what speaks against a name."""
+"""What speaks against a name, and probabilities."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from aqualog.diagnose.compete import compete
-from aqualog.diagnose.judge import judged, repeats
+from aqualog.diagnose.judge import repeats
 from aqualog.diagnose.noise import fit_noise
-from aqualog.diagnose.outcome import Outcome
 from aqualog.diagnose.probability import tempered
-from aqualog.diagnose.records import Cause, Estimate
 from aqualog.model.term import Model
-from tests.diagnose.test_unexplained import arena, remainder
-
-NAMED = Cause("aero_drag", None, {"delta": Estimate(0.3, 0.2, 0.4, "m^2")}, ("force_balance",), "More drag.")
-
-
-def verdict(a, *, forms=(), failed=(), outcome=None):
-    outcome = outcome or Outcome("named", (NAMED,), (), None, ())
-    return judged(outcome, forms, a, compete(a), Model(), failed)
-
-
-def test_a_sure_cause_keeps_its_name_and_bears_its_probability():
-    out = verdict(arena(3, aero_drag=0.4))
-    assert out.verdict == "named"
-    assert out.causes[0].probability > 0.95
-
-
-def test_a_cause_that_the_posterior_shares_with_others_is_not_named():
-    out = verdict(arena(3, payload_mass=600.0))
-    assert out.verdict == "cannot_tell"
-    assert out.causes[0].effect == "aero_drag"
-    assert out.causes[0].probability < 0.5
-    assert "payload_mass" in {c.effect for c in out.causes}
-    assert out.alternatives
-
-
-def test_a_failed_check_forbids_a_name():
-    out = verdict(arena(3, aero_drag=0.4), failed=("it has the other sign in the last third of the drive.",))
-    assert out.verdict == "cannot_tell"
-    assert out.small[-1].startswith("Not named: it has")
-
-
-def test_an_unknown_form_comes_before_a_name():
-    x = np.linspace(10.0, 30.0, 20)
-    out = verdict(arena(3, aero_drag=0.4), forms=(remainder(x, 0.0 * x),))
-    assert out.verdict == "unexplained"
-    # beside it what the same set has for certain, with the value of the competition
-    assert [c.effect for c in out.causes] == ["aero_drag"]
-    e = next(iter(out.causes[0].parameters.values()))
-    assert e.low < 0.4 < e.high
-
+from tests.diagnose.test_unexplained import arena
 
 @pytest.mark.parametrize(("last", "speaks"), [(1.0, False), (-1.5, True)])
 def test_a_value_with_another_sign_in_a_third_is_no_name(last, speaks):
