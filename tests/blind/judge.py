@@ -17,7 +17,7 @@ from typing import Any
 
 from tests.blind.judging.answers import Answer, read_answer
 from tests.blind.judging.cases import Judged, judge
-from tests.blind.judging.figures import figures, of_worlds, reliability_text, risk_coverage
+from tests.blind.judging.figures import figures, misses_text, of_worlds, reliability_text, risk_coverage
 from tests.blind.judging.run import Place, diagnose_all, places
 from tests.blind.metrics.table import curve_text, measures_text
 from tests.blind.sealed import LEDGER, open_truth, reopened
@@ -72,7 +72,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     worlds = of_worlds(cases)
     if len({c.world for c in cases}) > 1:
         print(f"\n{measures_text(worlds)}")
-    for text in (reliability_text(cases), curve_text(curve) if (curve := risk_coverage(cases)) else ""):
+    for text in (
+        reliability_text(cases),
+        curve_text(curve) if (curve := risk_coverage(cases)) else "",
+        misses_text(cases),
+    ):
         if text:
             print(f"\n{text}")
     ledgers = {p.out.parent / LEDGER for p in every}
@@ -90,7 +94,7 @@ def _line(c: Judged) -> dict[str, Any]:
         "case": row.key, "world": c.world, "kind": c.kind, "hidden": row.hidden, "z": [f.z for f in row.truth],
         "unknown": c.unknown, "verdict": row.verdict, "said": [x.key for x in row.causes],
         "forms": [[f.mechanisms, sorted(f.depends_on), f.probability] for f in c.forms], "first_is_right": c.first_is_right,
-        "right_or_twins": c.is_right_or_twins, "in_answer": c.in_answer, "wrong": row.wrong,
+        "right_or_twins": c.is_right_or_twins, "in_answer": c.in_answer, "wrong": c.wrong,
         "form_is_right": c.form_is_right, "error": row.error,
     }  # fmt: skip
 

@@ -116,6 +116,47 @@ def test_unknown_form_needs_mechanism_and_coordinate():
     assert got["hump, held back"] == (6, 0.5)
 
 
+def test_form_that_the_library_has_under_a_name_may_be_named():
+    unknown = {"mechanism": "kinematic", "depends_on": ["position"], "kind": "rolling_road", "held_back": False}
+    hidden = truth("unknown", unknown={**unknown, "accepts": ["road_grade", "unexplained_grade"]})
+    grade = judged(document("named", cause("road_grade", probability=0.9)), hidden)
+    other = judged(document("named", cause("head_wind", probability=0.9)), hidden)
+    both = judged(document("compound", cause("road_grade"), cause("head_wind")), hidden)
+    assert [c.form_is_right for c in (grade, other, both)] == [True, False, False]
+    assert [c.wrong for c in (grade, other, both)] == [False, True, True]
+    assert (grade.chances, other.chances) == (((0.9, True),), ((0.9, False),))
+    got = measured([grade, other, both])
+    assert got["misnamed"] == (3, pytest.approx(2 / 3))
+    assert got["unexplained"] == (3, pytest.approx(1 / 3))
+
+
+def test_exact_twin_is_right_and_one_of_three_is_not():
+    roll = ("rolling_resistance", None, "delta_r_w", 0.004)
+    twin = judged(document("named", cause("brake_drag", probability=0.9)), truth("known", roll))
+    grade = judged(document("named", cause("accelerometer_bias", where="a_x")), truth("known", roll))
+    assert (twin.first_is_right, twin.is_right_or_twins, twin.wrong) == (True, True, False)
+    assert twin.chances == ((0.9, True),)
+    assert (grade.first_is_right, grade.wrong) == (False, True)
+
+
+def test_effect_below_the_stated_limit_is_no_miss():
+    below = judged(document("no_effect", detection_limits={"payload_mass": "120 kg"}), truth("known", MASS))
+    above = judged(document("no_effect", detection_limits={"payload_mass": "80 kg"}), truth("known", MASS))
+    unsaid = judged(document("no_effect"), truth("known", MASS))
+    assert [c.limit_is_right for c in (below, above, unsaid)] == [True, False, False]
+    got = measured([below, above, unsaid])
+    assert got["right name first, z >= 8"] == (2, 0.0)
+    assert got["no effect, below the stated limit (no miss)"] == (3, pytest.approx(1 / 3))
+    assert len(made.misses_text([below, above, unsaid]).splitlines()) == 2
+
+
+def test_miss_shows_truth_and_answer_with_its_probability():
+    wrong = judged(document("named", cause("head_wind", probability=0.97)), truth("known", MASS))
+    line = made.misses_text([wrong])
+    assert "payload_mass z 10.0" in line
+    assert "named: head_wind 0.97" in line
+
+
 def test_what_the_clean_drive_says_is_not_counted():
     late = cause("signal_delay", 0.03, "torque", parameter="delay")
     clean = document("named", late)

@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from tests.blind.multibody.seal import seal_truth
 from tests.blind.sealed import LEDGER, SealError, open_truth, reopened, seal
 
 TRUTH = {
@@ -48,3 +49,18 @@ def test_changed_or_incomplete_truth_is_refused(tmp_path):
         seal(tmp_path / "c2", {**TRUTH, "kind": "named"})
     with pytest.raises(SealError, match="unknown"):
         seal(tmp_path / "c2", {**TRUTH, "kind": "unknown"})
+
+
+def test_truth_of_the_multibody_world_reads_as_the_others(tmp_path):
+    case = tmp_path / "case_0007"
+    case.mkdir()
+    one = {"effect": "payload_mass", "where": None, "values": {"delta_mass": 90.0}, "known": True, "z": 9.0}
+    seal_truth(case, {"hidden": [one], "programme": "city", "noise": "white", "seed": [5, 7]})
+    with pytest.raises(SealError, match="no verdict"):
+        open_truth(case)
+    (case / "verdict.json").write_text("{}")
+    truth = open_truth(case)
+    assert (truth["world"], truth["kind"], truth["drive_type"]) == ("multibody", "known", "city")
+    assert truth["effects"][0]["parameters"] == {"delta_mass": 90.0}
+    assert truth["effects"][0]["detectability"] == 9.0
+    assert reopened(tmp_path / LEDGER) == ()

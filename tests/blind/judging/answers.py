@@ -12,7 +12,7 @@ from aqualog.model.effects import EFFECTS
 from tests.blind.metrics.plan import TWINS
 from tests.blind.metrics.rows import Said, key_of
 
-__all__ = ["Answer", "Form", "judged_by", "mechanism_of", "read_answer", "twins_of"]
+__all__ = ["Answer", "Form", "exact_twins", "judged_by", "mechanism_of", "read_answer", "twins_of"]
 
 _NUMBER = re.compile(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?")
 _MECHANISMS = {"accel": "accelerometer", "tie": "tie_rod", "lateral": "lateral", "slip": "slip", "force": "force"}
@@ -72,6 +72,12 @@ def twins_of(effect: str) -> frozenset[str]:
     own = set(EFFECTS[effect].twins) if effect in EFFECTS else set()
     exact = {m for t in TWINS if effect in t.members for m in t.members}
     return frozenset((rows | own | exact) - {effect})
+
+
+def exact_twins(effect: str) -> frozenset[str]:
+    """Effects that no log tells from this one, one for one; in a relation of three none is the other by itself."""
+    pairs = [t.members for t in TWINS if not t.can and len(t.members) == 2]
+    return frozenset(m for p in pairs if effect in p for m in p) - {effect}
 
 
 def mechanism_of(text: str) -> str:

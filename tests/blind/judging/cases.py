@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from aqualog.model.effects import EFFECTS
-from tests.blind.judging.answers import Answer, Form, coordinates_of, judged_by, mechanism_of, twins_of
+from tests.blind.judging.answers import Answer, Form, coordinates_of, exact_twins, judged_by, mechanism_of, twins_of
 from tests.blind.metrics.measure import right_first, right_or_listed
 from tests.blind.metrics.rows import Fact, Row, Said
 
@@ -31,6 +31,7 @@ class Judged:
     unknown: Mapping[str, Any] | None = None
     chances: tuple[tuple[float, bool], ...] = ()
     gain_low: float = math.nan
+    probability: tuple[float, ...] = ()
     is_baseline: bool = False
     is_measured: bool = False
 
@@ -41,14 +42,46 @@ class Judged:
 
     @property
     def first_is_right(self) -> bool:
-        return right_first(self.row)
+        """The first cause is what is hidden or its exact twin, and nothing else is named beside it."""
+        twin = bool(self.row.names) and not self.wrong and self.row.causes[0].key not in self.row.hidden
+        return right_first(self.row) or twin
+
+    @property
+    def wrong(self) -> bool:
+        """Names without reserve what is neither hidden, nor its exact twin, nor a name that the truth accepts."""
+        right = set(self.row.hidden).union(*(exact_twins(f.effect) for f in self.row.truth))
+        return any(c.key not in right and c.effect not in right | self.accepted for c in self._named)
+
+    @property
+    def accepted(self) -> frozenset[str]:
+        """Names that are right for an unknown form as well."""
+        return frozenset((self.unknown or {}).get("accepts") or ())
+
+    @property
+    def is_accepted(self) -> bool:
+        """An unknown form is named, and by nothing but names that its truth accepts."""
+        return bool(self._named) and all(c.effect in self.accepted for c in self._named)
+
+    @property
+    def limit_is_right(self) -> bool:
+        """Nothing is found, and the one effect is below the limit that the verdict itself states for it."""
+        row = self.row
+        if row.verdict != "no_effect" or len(row.truth) != 1 or row.truth[0].key not in row.limits:
+            return False
+        fact = row.truth[0]
+        name, x = next(iter(fact.values.items()), ("", 0.0))
+        return abs(x - _neutral(fact.effect, name)) <= row.limits[fact.key]
+
+    @property
+    def _named(self) -> tuple[Said, ...]:
+        return self.row.causes if self.row.names else ()
 
     @property
     def is_right_or_twins(self) -> bool:
         """Named rightly, or a set that is what is hidden and its twins, and nothing else."""
         row = self.row
         if row.verdict in ("named", "compound"):
-            return set(row.names) == set(row.hidden)
+            return set(row.names) == set(row.hidden) or (len(row.names) == len(row.truth) == 1 and self.first_is_right)
         allowed = {f.effect for f in row.truth}.union(*(twins_of(f.effect) for f in row.truth)) if row.truth else set()
         said = {c.effect for c in row.causes}
         return row.verdict == "cannot_tell" and self.in_answer and said <= allowed
@@ -64,6 +97,8 @@ class Judged:
         return self._form(exact=False)
 
     def _form(self, *, exact: bool) -> bool:
+        if self.is_accepted:
+            return True
         if self.unknown is None or not self.forms or self.row.verdict != "unexplained":
             return False
         first = max(self.forms, key=lambda f: f.probability if math.isfinite(f.probability) else -1.0)
@@ -170,12 +205,13 @@ def judge(
         **{n: used.get(n, math.nan) for n in ("seconds", "cpu_seconds", "peak_mb")},
     )  # fmt: skip
     causes = zip(answer.causes, answer.probability, strict=True)
-    chances = [(p, c.key in row.hidden) for c, p in causes if math.isfinite(p)]
     unknown = truth["unknown"]
+    right = set(row.hidden).union((unknown or {}).get("accepts") or (), *(exact_twins(f.effect) for f in facts))
+    chances = [(p, c.key in right or c.effect in right - set(row.hidden)) for c, p in causes if math.isfinite(p)]
     for f in answer.forms:
         if math.isfinite(f.probability):
             chances.append((f.probability, unknown is not None and _fits(f, unknown, exact=True)))
     return Judged(
-        row, truth["world"], truth["kind"], answer.forms, unknown, tuple(chances), answer.gain_low,
+        row, truth["world"], truth["kind"], answer.forms, unknown, tuple(chances), answer.gain_low, answer.probability,
         is_baseline=bool(truth.get("is_baseline")), is_measured=clean is not None,
     )  # fmt: skip

@@ -14,7 +14,7 @@ from tests.blind.metrics import naming, worth
 from tests.blind.metrics.intervals import clopper_pearson
 from tests.blind.metrics.measure import Measure, quantity, share
 
-__all__ = ["figures", "of_worlds", "reliability_text", "risk_coverage"]
+__all__ = ["figures", "misses_text", "of_worlds", "reliability_text", "risk_coverage"]
 
 STRONG, WEAK, GAINFUL, SURE = 8.0, (3.0, 5.0), 6.0, 0.95
 EDGES = (0.0, 0.25, 0.5, 0.8, 0.9, 0.95, 1.0)
@@ -31,11 +31,11 @@ def figures(cases: Sequence[Judged]) -> list[Measure]:
 
 
 def of_worlds(cases: Sequence[Judged]) -> list[Measure]:
-    """The first figures of each world by itself."""
+    """The figures of each world by itself, without those of single effects."""
     out = []
     for world, group in sorted(_by((c for c in cases if not c.is_baseline), lambda c: c.world).items()):
-        for m in (false_discovery(group)[:1], names(group)[:3], wrong(group)[:1], unknown(group)[:2]):
-            out += [Measure(x.number, f"{world}: {x.name}", *_rest(x)) for x in m if x.count]
+        few = (m for m in figures(group) if m.count and not m.name.startswith("  "))
+        out += [Measure(m.number, f"{world}: {m.name}", *_rest(m)) for m in few]
     return out
 
 
@@ -93,7 +93,8 @@ def _words(c: Judged) -> str:
 
 def names(cases: Sequence[Judged]) -> list[Measure]:
     """Metric 2: the name of one strong effect; cases that failed are misses."""
-    strong = _singles(cases, STRONG)
+    every = _singles(cases, STRONG)
+    strong = [c for c in every if not c.limit_is_right]
     isolable = [c for c in strong if c.row.error or c.row.truth[0].p_right >= SURE]
     missed = [c for c in strong if not c.first_is_right]
     out = [
@@ -102,6 +103,9 @@ def names(cases: Sequence[Judged]) -> list[Measure]:
         share(2, "truth in the answer", [c.in_answer for c in strong], _least(0.98), ">= 0.98", least=100),
         share(2, "right name first, forecast isolable", [c.first_is_right for c in isolable], _least(0.95), ">= 0.95", least=100),
     ]  # fmt: skip
+    out.append(
+        share(2, "no effect, below the stated limit (no miss)", [c.limit_is_right for c in every], _anything, "-")
+    )
     for effect, group in sorted(_by(strong, lambda c: c.row.truth[0].effect).items()):
         note = _missed([c for c in group if not c.first_is_right])
         out.append(
@@ -119,10 +123,10 @@ def wrong(cases: Sequence[Judged]) -> list[Measure]:
     """Metric 3: a name without reserve for what is not hidden."""
     strong, small = _singles(cases, STRONG), _singles(cases, 0.0, np.nextafter(STRONG, 0.0))
     return [
-        share(3, "confidently wrong, z >= 8", [c.row.wrong for c in strong], _most(0.01), "<= 0.01", least=100,
-              note=_said([c for c in strong if c.row.wrong])),
-        share(3, "confidently wrong, z < 8", [c.row.wrong for c in small], _most(0.03), "<= 0.03", least=100,
-              note=_said([c for c in small if c.row.wrong])),
+        share(3, "confidently wrong, z >= 8", [c.wrong for c in strong], _most(0.01), "<= 0.01", least=100,
+              note=_said([c for c in strong if c.wrong])),
+        share(3, "confidently wrong, z < 8", [c.wrong for c in small], _most(0.03), "<= 0.03", least=100,
+              note=_said([c for c in small if c.wrong])),
     ]  # fmt: skip
 
 
@@ -131,7 +135,7 @@ def weak(cases: Sequence[Judged]) -> list[Measure]:
     few = _singles(cases, *WEAK)
     silent = [c for c in few if c.row.verdict == "no_effect"]
     return [
-        share(4, "confidently wrong at z 3 ... 5", [c.row.wrong for c in few], _most(0.05), "<= 0.05", least=40),
+        share(4, "confidently wrong at z 3 ... 5", [c.wrong for c in few], _most(0.05), "<= 0.05", least=40),
         share(4, "truth in the answer at z 3 ... 5", [c.in_answer for c in few], _anything, "-"),
         share(4, "no effect, and the limit holds the truth", [_below(c) for c in silent], _least(0.85), ">= 0.85", least=20),
     ]  # fmt: skip
@@ -171,7 +175,7 @@ def calibration(cases: Sequence[Judged]) -> list[Measure]:
     """`probability` of causes and forms beside whether they were so; nothing where an engine does not say any."""
     pairs = [p for c in cases for p in c.chances]
     return [
-        _skill(6, "probability, Brier skill over the base rate", pairs, 100),
+        _skill(6, "probability, Brier skill over the base rate", pairs, 100, above=0.2),
         _worst(6, "probability, worst bin", pairs, 100),
         Measure(6, "probability, expected calibration error", len(pairs), _ece(pairs), math.nan, math.nan, "<= 0.05",
                 _ece(pairs) <= 0.05 if len(pairs) >= 100 else None),
@@ -181,12 +185,14 @@ def calibration(cases: Sequence[Judged]) -> list[Measure]:
 Pairs = Sequence[tuple[float, bool]]
 
 
-def _skill(number: int, name: str, pairs: Pairs, least: int) -> Measure:
+def _skill(number: int, name: str, pairs: Pairs, least: int, above: float = 0.0) -> Measure:
     p, o = np.array([x for x, _ in pairs]), np.array([float(y) for _, y in pairs])
     constant = float(np.mean((o - o.mean()) ** 2)) if o.size else 0.0
     skill = 1.0 - float(np.mean((p - o) ** 2)) / constant if constant > 0.0 else math.nan
     known = len(pairs) >= least and math.isfinite(skill)
-    return Measure(number, name, len(pairs), skill, math.nan, math.nan, "> 0", skill > 0.0 if known else None)
+    return Measure(
+        number, name, len(pairs), skill, math.nan, math.nan, f"> {above:g}", skill > above if known else None
+    )
 
 
 def bins(pairs: Pairs) -> list[tuple[float, float, int, int, float]]:
@@ -220,6 +226,33 @@ def reliability_text(cases: Sequence[Judged]) -> str:
     return "\n".join(lines) if pairs else ""
 
 
+def misses_text(cases: Sequence[Judged]) -> str:
+    """A line for each case that is not right: case, truth, answer with its probabilities, error; empty if there is none."""
+    return "\n".join(
+        f"{c.row.key:24s} {_hidden(c):44s} -> {_answer(c)}" for c in cases if not c.is_baseline and _is_miss(c)
+    )
+
+
+def _is_miss(c: Judged) -> bool:
+    if c.row.error or c.wrong:
+        return True
+    if c.kind == "null":
+        return c.row.found
+    return not (c.form_is_right if c.kind == "unknown" else c.is_right_or_twins or c.limit_is_right)
+
+
+def _hidden(c: Judged) -> str:
+    if c.unknown:
+        return f"{c.unknown['kind']} ({', '.join(c.unknown['depends_on'])})"
+    return " + ".join(f"{f.key} z {f.z:.1f}" for f in c.row.truth) or "nothing"
+
+
+def _answer(c: Judged) -> str:
+    causes = [f"{x.key} {p:.2f}" for x, p in zip(c.row.causes, c.probability, strict=True)]
+    forms = [f"{'/'.join(f.mechanisms)} over {', '.join(sorted(f.depends_on))} {f.probability:.2f}" for f in c.forms]
+    return f"{c.row.error or c.row.verdict}: {'; '.join((*causes, *forms)) or '-'}"
+
+
 def compounds(cases: Sequence[Judged]) -> list[Measure]:
     """Metric 9, as for the blind drives; a case whose separation is not known counts."""
     return worth.compounds([replace(c.row, group="compound") for c in cases if c.kind == "compound"])
@@ -241,11 +274,11 @@ def unknown(cases: Sequence[Judged]) -> list[Measure]:
     """Metric 11: forms that no effect has; those held back from development by themselves."""
     some = [c for c in cases if c.kind == "unknown"]
     out = [
-        share(11, "unexplained", [c.row.verdict == "unexplained" for c in some], _least(0.90), ">= 0.90", least=40),
+        share(11, "unexplained", [c.row.verdict == "unexplained" or c.is_accepted for c in some], _least(0.90), ">= 0.90", least=40),
         share(11, "with the right mechanism and coordinate", [c.form_is_right for c in some], _least(0.90), ">= 0.90", least=40),
         share(11, "with them in part", [c.form_is_near for c in some], _anything, "-"),
-        share(11, "misnamed", [bool(c.row.names) for c in some], _most(0.05), "<= 0.05", least=40,
-              note=_said([c for c in some if c.row.names])),
+        share(11, "misnamed", [c.wrong for c in some], _most(0.05), "<= 0.05", least=40,
+              note=_said([c for c in some if c.wrong])),
     ]  # fmt: skip
     for name, group in sorted(_by(some, lambda c: str((c.unknown or {})["kind"])).items()):
         text = f"  {name}" + (", held back" if any((c.unknown or {})["held_back"] for c in group) else "")

@@ -6,8 +6,9 @@ import hashlib
 import json
 import zlib
 from pathlib import Path
+from typing import Any
 
-__all__ = ["LEDGER", "SealError", "open_truth", "seal_truth"]
+__all__ = ["LEDGER", "SealError", "judged_truth", "open_truth", "seal_truth"]
 
 LEDGER = "ledger.jsonl"
 TRUTH = "truth.bin"
@@ -59,12 +60,35 @@ def open_truth(folder: Path, verdict_path: Path) -> dict[str, object]:
     if not before:
         with ledger.open("a", encoding="utf-8") as file:
             file.write(json.dumps(line) + "\n")
+    return _opened(sealed, folder)
+
+
+def judged_truth(sealed: bytes, folder: Path) -> dict[str, object]:
+    """The truth in the words of `tests.blind.sealed`; whoever calls has checked that a verdict stands."""
+    truth = _opened(sealed, folder)
+    hidden = truth["hidden"]
+    form = next((h for h in hidden if not h["known"]), None)
+    unknown = None if form is None else {
+        "mechanism": form["channel"], "depends_on": form["depends_on"], "kind": form["effect"],
+        "held_back": form["held_back"], "accepts": form["accepts"], "parameters": form["values"],
+    }  # fmt: skip
+    effects = [
+        {"effect": h["effect"], "where": h["where"], "parameters": h["values"], "detectability": h.get("z")}
+        for h in hidden if h["known"]
+    ]  # fmt: skip
+    kind = "unknown" if form else ("null", "known", "compound")[min(len(effects), 2)]
+    return {
+        "world": "multibody", "seed": truth["seed"], "kind": kind, "drive_type": truth["programme"],
+        "noise": truth["noise"], "effects": effects, "unknown": unknown,
+    }  # fmt: skip
+
+
+def _opened(sealed: bytes, folder: Path) -> dict[str, Any]:
     whole = _mixed(sealed, _number(folder))
     try:
-        truth: dict[str, object] = json.loads(zlib.decompress(whole[4 : 4 + int.from_bytes(whole[:4], "big")]))
+        return dict(json.loads(zlib.decompress(whole[4 : 4 + int.from_bytes(whole[:4], "big")])))
     except (ValueError, zlib.error):
         raise SealError(f"{folder / TRUTH} does not belong to case {_number(folder)}") from None
-    return truth
 
 
 def _number(folder: Path) -> int:
