@@ -81,7 +81,7 @@ def compete(arena: Arena) -> Posterior:
     best: Members = ()
     least = _surprise(weighings)
     gram, tolerant = _inner(arena, weighings)
-    tried: set[Members] = {()}
+    tried: set[Members] = set()
     for k in range(ROUNDS + 1):
         quieter = _quieter(arena, best, (tolerant, white), least, tried)
         if quieter is not None:
@@ -106,7 +106,8 @@ def _quieter(
     found = None
     for metric in metrics:
         for members in (best, *(tuple(sorted((*best, m))) for m in _first(arena, metric, best))):
-            if members in tried:
+            # the best set again: under a better noise it has better values
+            if not members or (members in tried and members != best):
                 continue
             tried.add(members)
             again = arena.weighed(_left(arena, metric, members))
