@@ -12,6 +12,7 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.day_to_day import as_value, day_to_day, kind_of
 from aqualog.diagnose.drive import Drive
+from aqualog.diagnose.file_values import deviation
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
 from aqualog.model.term import Kind
@@ -56,9 +57,9 @@ class Evidence:
     smallest: FloatArray
     tolerance: FloatArray  # (K,) deviation of each parameter that is not worth naming
     barred: BoolArray  # (H,) hypotheses that contradict the drives: neither tested nor put into sets
-    spread: FloatArray  # (K,) measured spread between drives of the same car, 0 where it was not measured
+    spread: FloatArray  # (K,) of the same car between drives, where measured, and of the file's own value
     kinds: tuple[Kind, ...]  # (K,) the kind of day-to-day difference that each looks like
-    as_values: FloatArray  # (K,) size of that difference, expressed as its value
+    as_values: FloatArray  # (K,) size of that difference and of the file's errors, expressed as its value
 
     @property
     def count(self) -> int:
@@ -95,10 +96,11 @@ def make_evidence(
             low.append(p.low - now)
             high.append(p.high - now)
             smallest.append(h.worth_naming(name))
-            spread.append(day_to_day(h, name, drives[0].vehicle))
+            car = drives[0].vehicle
+            spread.append(math.hypot(day_to_day(h, name, car), deviation(h, name, car)))
             kinds.append(kind_of(h, name))
-            as_values.append(as_value(h, name, drives[0].vehicle, speed))
-            tolerance.append(h.tolerance_of(name, drives[0].vehicle))
+            as_values.append(as_value(h, name, car, speed))
+            tolerance.append(h.tolerance(name))
     flat = [np.concatenate(list(s)) for s in signatures]
     prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(flat, drives, strict=True))
     return Evidence(

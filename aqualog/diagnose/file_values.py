@@ -1,6 +1,6 @@
 """How far the values of a vehicle file may be off themselves, expressed in the parameters of effects.
 
-The key stands in the effect's row: `DayToDay.key` of the whole car, `DriveSearch.unset` of an axle.
+The key stands in the effect's row: `DayToDay.key` of the whole car, `DriveSearch.axle_key` of an axle.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from aqualog.core.provenance import provenance_of, uncertainty
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.hypotheses import Hypothesis
 
-__all__ = ["calibrated_enough", "deviation", "key_of", "not_calibrated"]
+__all__ = ["calibrated_enough", "deviation", "key_of", "not_calibrated", "own_sd"]
 
 _MATTERS = ("mass", "torque_gain", "wheels.r_e_f", "wheels.r_e_r")
 
@@ -20,10 +20,10 @@ def key_of(h: Hypothesis, name: str) -> str:
 
     Each key counts at one place: that of the whole car there, that of an axle at the axle.
     """
-    p, unset = h.parameter(name), h.effect.drive.unset
+    p, start = h.parameter(name), h.effect.drive.axle_key
     if h.where is None and p.day_to_day is not None:
         return p.day_to_day.key
-    return unset[0] + h.where if unset is not None and h.where in AXLES and p is h.effect.parameters[0] else ""
+    return start + h.where if start and h.where in AXLES and p is h.effect.parameters[0] else ""
 
 
 def deviation(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
@@ -35,9 +35,22 @@ def deviation(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
     path = key_of(h, name)
     if not path:
         return 0.0
-    p, sd = h.parameter(name), uncertainty(vehicle, path)
+    p, sd = h.parameter(name), own_sd(vehicle, path)
     is_sum = p.neutral == 0.0 and p.unit == KEYS[path].unit
     return sd if is_sum else sd / float(getattr(vehicle, KEYS[path].name))
+
+
+def own_sd(vehicle: Vehicle, path: str) -> float:
+    """Standard deviation of the file's own value of a key, in the key's unit; 0 for a mass and a gain that are bound.
+
+    A balance of forces shows the ratio of mass and torque gain. Once drives have calibrated one of them, that ratio is
+    known. Both may be off together, which no drive shows.
+    """
+    return 0.0 if path in ("mass", "torque_gain") and _is_bound(vehicle) else uncertainty(vehicle, path)
+
+
+def _is_bound(vehicle: Vehicle) -> bool:
+    return "calibrated" in {provenance_of(vehicle, path).source for path in ("mass", "torque_gain")}
 
 
 def calibrated_enough(vehicle: Vehicle) -> tuple[str, ...]:
@@ -45,9 +58,8 @@ def calibrated_enough(vehicle: Vehicle) -> tuple[str, ...]:
 
     A mass that is calibrated binds the torque gain: the drives have shown their ratio.
     """
-    source = {path: provenance_of(vehicle, path).source for path in _MATTERS}
-    bound = {"torque_gain"} if source["mass"] == "calibrated" else set()
-    return tuple(path for path in _MATTERS if source[path] == "guess" and path not in bound)
+    bound = {"torque_gain"} if provenance_of(vehicle, "mass").source == "calibrated" else set()
+    return tuple(p for p in _MATTERS if provenance_of(vehicle, p).source == "guess" and p not in bound)
 
 
 def not_calibrated(vehicle: Vehicle) -> str:

@@ -299,7 +299,7 @@ _ALL = [
         _on_plant(lambda p, v, w: p._replace(
             inertia=np.maximum(_changed(p.inertia, w, np.add, v["delta_inertia"]), 0.05))),
         _WHEEL_PLACES, twins=("payload_mass",),
-        drive=DriveSearch((_TORQUE,), tolerance=0.15, unset=("wheels.inertia_", 0.3)),
+        drive=DriveSearch((_TORQUE,), tolerance=0.15, axle_key="wheels.inertia_"),
     ),
     Effect(
         "accelerometer_bias", "accelerometer [m/s²]", "The accelerometer is off by {bias:+.2f} m/s².",
@@ -347,7 +347,7 @@ _ALL = [
         "15-50 over tyres (K); temperature, wear (V, Carlson and Gerdes [carlson2005])",
         (Parameter("gain", "-", 1.0, 0.2, 0.2, 2.5, 0.05, "on the dry slope; 50 over 20"),),
         _times(slip_slope="gain"), _WHEEL_PLACES,
-        drive=DriveSearch((_SPEEDS,), by_wheel=True, tolerance=0.05, unset=("tyre.slip_slope_", 0.2)),
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, tolerance=0.05, axle_key="tyre.slip_slope_"),
         campaign=CampaignSearch(5, ("f", "r"), "slip slope",
             "The slip slope of {place} is {0.value:.2f} times the vehicle file's " + _SPAN + ".", driven=True,
         ),
@@ -377,7 +377,7 @@ _ALL = [
         _on_plant(lambda p, v, w: p._replace(
             **{n: _changed(getattr(p, n), w, np.multiply, 1.0 + v["delta"]) for n in ("r_e", "r_l")})),
         _WHEEL_PLACES, twins=("velocity_scale",),
-        drive=DriveSearch((_SPEEDS,), by_wheel=True, unset=("wheels.r_e_", 0.01)),
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, axle_key="wheels.r_e_"),
     ),
     Effect(
         "pressure_loss", "radius and slip slope of a tyre that loses its air", "The tyre lost its air.",

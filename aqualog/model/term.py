@@ -68,8 +68,8 @@ class DriveSearch:
     are sought; `variants` are values of the others, by the length of the longest drive [s].
 
     `tolerance`: standard deviation that is not worth naming; None: a third of the smallest size, 0: a car has the
-    effect or not; `tolerance_at` some places. `unset`: start of an axle's key in the vehicle file, which the first
-    parameter changes, and the share by which cars differ where it is not set. `equals`: effects that together look like
+    effect or not; `tolerance_at` some places. `axle_key`: start of an axle's key in the vehicle file, which the first
+    parameter changes. `equals`: effects that together look like
     this one on every log. `check`: how it is read without driving.
 
     `turns`: the sign changes on the way back; `is_shift`: it moves signals in time; `is_relative`: at all its places
@@ -84,7 +84,7 @@ class DriveSearch:
     variants: Callable[[float], Sequence[Mapping[str, float]]] = lambda _: ({},)
     tolerance: float | None = None
     tolerance_at: Mapping[str, float] = field(default_factory=dict)
-    unset: tuple[str, float] | None = None
+    axle_key: str = ""
     equals: tuple[str, ...] = ()
     check: Check | None = None
     turns: bool = False

@@ -57,8 +57,9 @@ writes it.
 _PROVENANCE = """
 `[provenance]` says where the value of a key comes from: `mass = "measured"`. With a standard deviation of its own it is
 `wheels.r_e_f = { source = "calibrated", sd = 0.0004 }`, in the key's unit. A key that is set without a line here counts
-as `data_sheet`. A key that is not set is a `guess`, and no other source may be given for it. `aqualog calibrate` writes
-what it estimated, and measured for what `--fix` gave.
+as `data_sheet`, with a value in `[spread]` as `calibrated`. A key that is not set is a `guess`, and no other source may
+be given for it. `aqualog calibrate` writes what it estimated, and measured for what `--fix` gave. `aqualog diagnose`
+names nothing that these deviations explain.
 """
 _PROVENANCE_SD = """
 The standard deviation of a value whose line gives none. [`[spread]`](#spread-between-drives) comes on top.
