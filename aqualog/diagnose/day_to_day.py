@@ -50,9 +50,9 @@ def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:
         At which its drag counts. [m/s]
     """
     row = h.parameter(name).day_to_day
-    axle = 0.0 if h.where is None else deviation(h, name, vehicle)
+    own = deviation(h, name, vehicle)
     if row is None:
-        return axle
+        return own
 
     def off(key: str) -> float:
         return math.hypot(vehicle.spread.get(key, 0.0), own_sd(vehicle, key))
@@ -62,4 +62,6 @@ def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:
         "drag": off("drag_area"),
         "rolling": off("rolling_resistance"),
     }[row.kind]
-    return math.hypot(row.value(sd, vehicle, h.where, speed), axle)
+    alike = row.value(sd, vehicle, h.where, speed)
+    is_in = h.where is None and row.key  # the file's own value is one of those above
+    return max(alike, own) if is_in else math.hypot(alike, own)

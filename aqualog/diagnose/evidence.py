@@ -13,13 +13,13 @@ from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.day_to_day import as_value, day_to_day, kind_of
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.file_values import deviation
-from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
-from aqualog.model.term import Kind
+from aqualog.model.term import Kind, Model
 
-__all__ = ["Evidence", "Stack", "gram_of", "make_evidence", "noises_after", "tolerant", "without_deviations"]
+__all__ = ["Evidence", "Stack", "gram_of", "make_evidence", "noises_after", "recentred", "tolerant"]
 
-ROUNDS = 200  # rounds of coordinate descent: it converges slowly where deviations look alike
+FARTHEST = 2.0  # standard deviations that the drives may move a value of the file
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,38 +128,27 @@ def tolerant(evidence: Evidence, gram: FloatArray) -> FloatArray:
     return np.asarray(gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :]))
 
 
-def without_deviations(
-    evidence: Evidence, d: int, residual: FloatArray, columns: Sequence[int], *, farthest: float = math.inf
-) -> FloatArray:
-    """A residual (C, n) of drive d minus the most likely deviations of these columns within their tolerances.
+def recentred(evidence: Evidence, model: Model) -> Model:
+    """The model with the file's own values where these drives most likely have them, if that is far from the file.
 
-    The deviations are the columns' posterior means, theta = (S^-2 + A'A)^-1 A'y; the remainder is y in the metric of
-    `tolerant`. The noise is estimated again after a first round, because the deviations still count as noise in that
-    round. No deviation exceeds `farthest` tolerances: a large effect must not vanish because it has the form of a
-    tolerance.
+    Signatures are straight lines from the values at hand. A gain that is 10 % off bends them by more than the noise,
+    and the bend would get a name. The deviations theta = (S^-2 + A'A)^-1 A'y stay as unsure as they were, around the
+    new values. The noise is estimated again after a first round, in which the deviations still count as noise.
     """
-    drive = evidence.drives[d]
-    k = [c for c in columns if evidence.forgiven[c] > 0.0]
-    left = residual
-    for _ in range(2 if k else 0):
-        noise = fit_noise(left, drive.mask, contrasts(drive.channels))
-        A = whitened(evidence.prepared[d].of(k), noise)
-        y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)[0]
-        theta = _within(A @ A.T + np.diag(evidence.forgiven[k] ** -2.0), A @ y, farthest * evidence.forgiven[k])
-        left = residual - np.tensordot(theta, evidence.signatures[d][k], axes=1)
-    return left
-
-
-def _within(G: FloatArray, b: FloatArray, most: FloatArray) -> FloatArray:
-    """Minimum of theta' G theta / 2 - b' theta with |theta| <= `most`, by coordinate descent. (k,)"""
-    theta = np.clip(np.linalg.solve(G, b), -most, most)
-    if np.all(np.abs(theta) < most):
-        return np.asarray(theta)
-    for _ in range(ROUNDS):
-        for i in range(theta.size):
-            theta[i] += (b[i] - G[i] @ theta) / G[i, i]
-            theta[i] = min(max(theta[i], -most[i]), most[i])
-    return np.asarray(theta)
+    car = evidence.drives[0].vehicle
+    names = [(h, n) for h in evidence.asked for n in h.free]
+    k = np.flatnonzero(evidence.forgiven > 0.0)
+    theta: dict[int, float] = {}
+    for _ in range(2):
+        gram = gram_of(evidence, noises_after(evidence, evidence.residuals, theta), evidence.residuals)
+        inner = gram[np.ix_(k, k)] + np.diag(evidence.forgiven[k] ** -2.0)
+        theta = dict(zip(k.tolist(), np.linalg.solve(inner, gram[k, -1]).tolist(), strict=True))
+    moved = []
+    for c, off in theta.items():
+        (h, n), most = names[c], FARTHEST * deviation(*names[c], car)
+        if most > 0.0 and abs(off) >= h.worth_naming(n):
+            moved.append((h, {n: value_in(model, h, n) + float(np.clip(off, max(-most, evidence.low[c]), most))}))
+    return with_values(model, moved)
 
 
 def gram_of(evidence: Evidence, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:

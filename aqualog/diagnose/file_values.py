@@ -5,12 +5,16 @@ The key stands in the effect's row: `DayToDay.key` of the whole car, `DriveSearc
 
 from __future__ import annotations
 
+import math
+
 from aqualog.core.notation import AXLES
 from aqualog.core.provenance import provenance_of, uncertainty
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.model.effects import EFFECTS
+from aqualog.model.term import Model, Term
 
-__all__ = ["calibrated_enough", "deviation", "key_of", "not_calibrated", "own_sd"]
+__all__ = ["calibrated_enough", "deviation", "key_of", "not_calibrated", "own_sd", "with_known"]
 
 _MATTERS = ("mass", "torque_gain", "wheels.r_e_f", "wheels.r_e_r")
 
@@ -29,15 +33,18 @@ def key_of(h: Hypothesis, name: str) -> str:
 def deviation(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
     """Standard deviation of the file's own value, in the unit of an effect's parameter; 0 where no key holds it.
 
+    The value of a key, of a known fault, or of both.
+
     A share of the value where the parameter multiplies it (`torque_gain`, `tyre_radius`), else in the key's unit.
     Differences between drives (`day_to_day`) are not in it, and independent of it.
     """
-    path = key_of(h, name)
+    path, known = key_of(h, name), vehicle.known.get(h.key)
+    fault = known.spread if known is not None and name == next(iter(known.values)) else 0.0
     if not path:
-        return 0.0
+        return fault
     p, sd = h.parameter(name), own_sd(vehicle, path)
     is_sum = p.neutral == 0.0 and p.unit == KEYS[path].unit
-    return sd if is_sum else sd / float(getattr(vehicle, KEYS[path].name))
+    return math.hypot(fault, sd if is_sum else sd / float(getattr(vehicle, KEYS[path].name)))
 
 
 def own_sd(vehicle: Vehicle, path: str) -> float:
@@ -51,6 +58,15 @@ def own_sd(vehicle: Vehicle, path: str) -> float:
 
 def _is_bound(vehicle: Vehicle) -> bool:
     return "calibrated" in {provenance_of(vehicle, path).source for path in ("mass", "torque_gain")}
+
+
+def with_known(model: Model, vehicle: Vehicle) -> Model:
+    """The model with the known faults of the car on top, unless it has them itself."""
+    for key, fault in vehicle.known.items():
+        term = Term(EFFECTS[key.partition("@")[0]], fault.values, key.partition("@")[2] or None)
+        if all((t.effect, t.place) != (term.effect, term.place) for t in model.terms):
+            model = model.with_term(term)
+    return model
 
 
 def calibrated_enough(vehicle: Vehicle) -> tuple[str, ...]:
