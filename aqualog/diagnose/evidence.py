@@ -19,7 +19,7 @@ from aqualog.model.term import Kind, Model
 
 __all__ = ["Evidence", "Stack", "gram_of", "make_evidence", "noises_after", "recentred", "tolerant"]
 
-FARTHEST = 2.0  # standard deviations that the drives may move a value of the file
+FARTHEST = 2.0  # standard deviations, beyond which a fault is likelier than an error of the file
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,9 +145,12 @@ def recentred(evidence: Evidence, model: Model) -> Model:
         theta = dict(zip(k.tolist(), np.linalg.solve(inner, gram[k, -1]).tolist(), strict=True))
     moved = []
     for c, off in theta.items():
-        (h, n), most = names[c], FARTHEST * deviation(*names[c], car)
-        if most > 0.0 and abs(off) >= h.worth_naming(n):
-            moved.append((h, {n: value_in(model, h, n) + float(np.clip(off, max(-most, evidence.low[c]), most))}))
+        h, n = names[c]
+        if (
+            h.worth_naming(n) <= abs(off) <= FARTHEST * deviation(h, n, car)
+            and evidence.low[c] < off < evidence.high[c]
+        ):
+            moved.append((h, {n: value_in(model, h, n) + off}))
     return with_values(model, moved)
 
 

@@ -20,6 +20,7 @@ __all__ = [
 ]  # fmt: skip
 
 Kind = Literal["", "inertia", "drag", "rolling"]  # of the differences between drives of the same car
+Belongs = Literal["car", "tyre", "drive", "moment"]
 Need = Literal["water depth", "wheel torque", "wheel speeds"]
 
 Knots = tuple[tuple[float, float], ...]
@@ -166,6 +167,7 @@ class Effect:
     `target`: the quantity that it changes. `places`: where it may sit, as `fl`, `f`, `left`, a signal's name; empty:
     the whole car. `default`: place if none is given (None: the car). `apply` is pure and returns a new setup. `less`:
     sentence for a negative first value, which it shows as positive. `campaign` None: a campaign does not show it.
+    `belongs`: what has it, and so which drives share its value; one of a drive or a moment differs from drive to drive.
     """
 
     name: str
@@ -181,6 +183,7 @@ class Effect:
     less: str = ""
     drive: DriveSearch = DriveSearch()
     campaign: CampaignSearch | None = None
+    belongs: Belongs = "car"
 
     @property
     def of_water(self) -> bool:

@@ -10,7 +10,7 @@ from aqualog.core.vehicle import Provenance
 from aqualog.diagnose.arena import arena_of
 from aqualog.diagnose.day_to_day import as_value, day_to_day
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.evidence import gram_of, noises_after, tolerant, without_deviations
+from aqualog.diagnose.evidence import gram_of, noises_after, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import simulated
@@ -141,19 +141,3 @@ def test_a_load_is_as_unsure_as_the_gain_that_looks_like_it(where):
     car = replace(CAR, spread={"torque_gain": 0.03})
     _, _, _, sd = loaded(car, (one("payload_mass", where), one("torque_gain")))
     assert 0.03 * CAR.mass < sd < 0.035 * CAR.mass
-
-
-def spread_of(evidence):
-    return np.flatnonzero(evidence.spread > 0.0).tolist()
-
-
-def test_what_drives_differ_by_is_nothing_to_look_for():
-    evidence, *_ = of_mass(60.0)
-    left = without_deviations(evidence, 0, evidence.residuals[0], spread_of(evidence))
-    mask, force = evidence.drives[0].mask, evidence.drives[0].channels.index("force_balance")
-    before, after = (float(np.mean(x[force, mask] ** 2)) for x in (evidence.residuals[0], left))
-    gone = evidence.residuals[0] - left
-    assert after < 0.7 * before
-    assert 60.0 < float(np.sum(gone * evidence.signatures[0][0]) / np.sum(evidence.signatures[0][0] ** 2)) < 125.0
-    plain, *_ = of_mass(0.0)
-    assert without_deviations(plain, 0, plain.residuals[0], spread_of(plain)) is plain.residuals[0]
