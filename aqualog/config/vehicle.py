@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from aqualog.config.reader import Table, is_real, quoted, read
+from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import (
     COEFFICIENTS,
     KEYS,
@@ -15,12 +16,16 @@ from aqualog.core.vehicle import (
     SOURCES,
     SPLIT,
     SPREAD,
+    Known,
     Provenance,
     Vehicle,
+    known_lines,
     provenance_lines,
     spread_lines,
     usual,
 )
+from aqualog.model.effects import EFFECTS
+from aqualog.model.term import Term
 
 if TYPE_CHECKING:
     from aqualog.calibrate.records import Calibration, Parameter
@@ -33,7 +38,7 @@ LARGEST_GAIN = 100.0  # [-], [m] of the first power; a rod bears a tenth to a ha
 TYPICAL_FORCE = 1000.0  # [N] at which a higher power may give as much as the first (D)
 
 _SECTIONS = tuple(dict.fromkeys(k.section for k in KEYS.values() if k.section))
-_TABLES = (*_SECTIONS, *POLYNOMIALS, "spread", "provenance")
+_TABLES = (*_SECTIONS, *POLYNOMIALS, "spread", "provenance", "known")
 _TABLES_AND_WORDS = ("name", "drivetrain", *_TABLES)
 
 
@@ -64,6 +69,7 @@ def load_vehicle(path: Path) -> Vehicle:
     for section in _SECTIONS:
         table = file.table(section)
         _numbers(table, section, table.values, values, given)
+    values["known"] = _known(file.table("known"))
     values["provenance"] = _provenance(file.table("provenance"), given)
     file.faults.raise_if_any()
     car = Vehicle(**values, given=frozenset(given))
@@ -122,6 +128,31 @@ def _source_and_sd(table: Table, name: str, path: str, said: Any) -> Provenance 
         return None
     sd = None if own is None else own.number("sd", _Deviation(KEYS[path].high, KEYS[path].unit))
     return Provenance(source, sd)  # type: ignore[arg-type]
+
+
+def _known(table: Table) -> dict[str, Known]:
+    """Read known faults: `"signal_delay@torque" = { delay = 0.03, spread = 0.005 }`."""
+    found: dict[str, Known] = {}
+    for key, value in table.values.items():
+        name, _, where = key.partition("@")
+        effect = EFFECTS.get(name)
+        if effect is None:
+            table.unknown(key, EFFECTS, what="effect")
+            continue
+        names = [p.name for p in effect.parameters]
+        if not isinstance(value, dict) or not set(names) & set(value):
+            table.add(key, f"known.{key} has no value; expected {{ {names[0]} = ..., spread = ... }}")
+            continue
+        own, first = table.child(key, value), effect.parameters[0]
+        values = own.numbers({p.name: p for p in effect.parameters}, "spread")
+        spread = own.number("spread", _Deviation(first.high - first.low, first.unit))
+        try:
+            place = Term(effect, values, where or None).place
+        except ConfigError as error:
+            table.add(key, error.line())
+            continue
+        found[name if place is None else f"{name}@{place}"] = Known(values, spread or 0.0)
+    return found
 
 
 class _Deviation(NamedTuple):
@@ -196,6 +227,8 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
         lines += ["", "[spread]", "# standard deviation by which one more drive differs", *spread_lines(new)]
     if new.provenance:
         lines += ["", "[provenance]", "# where a value comes from; sd: its standard deviation", *provenance_lines(new)]
+    if new.known:
+        lines += ["", "[known]", "# faults of this car that are known", *known_lines(new)]
     for part in POLYNOMIALS:
         table = getattr(new, part)
         if not table:

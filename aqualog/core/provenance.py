@@ -63,12 +63,13 @@ TYPICAL: Mapping[str, Typical] = {
 def provenance_of(vehicle: Vehicle, path: str) -> Provenance:
     """Where the value of a key (`wheels.r_e_f`) comes from.
 
-    A key that is set counts as from a data sheet unless the file says more. One that is not set is a guess: the default
-    of another car, whatever else was said of it.
+    A key that is set counts as from a data sheet unless the file says more, and as calibrated if it stands in `spread`:
+    only drives of this car show how much they differ. One that is not set is a guess: the default of another car,
+    whatever else was said of it.
     """
     said = vehicle.provenance.get(path)
     if path in vehicle.given:
-        return said or Provenance("data_sheet")
+        return said or Provenance("calibrated" if path in vehicle.spread else "data_sheet")
     return said if said is not None and said.source == "guess" else Provenance("guess")
 
 

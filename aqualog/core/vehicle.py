@@ -22,9 +22,11 @@ __all__ = [
     "SPREAD",
     "Drivetrain",
     "Key",
+    "Known",
     "Provenance",
     "Source",
     "Vehicle",
+    "known_lines",
     "provenance_lines",
     "spread_lines",
     "usual",
@@ -121,11 +123,20 @@ class Provenance:
 
 
 @dataclass(frozen=True, slots=True)
+class Known:
+    """A known fault of the car: values of an effect's parameters, and the standard deviation of the first one."""
+
+    values: Mapping[str, float]
+    spread: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """One vehicle, SI.
 
     `given` are the keys that the user's file sets; a detector that needs a key which is not given says so instead of
     trusting a default. `provenance` is what the file says of its values; `core.provenance` knows the rest.
+    `known`: faults by effect and place, as `signal_delay@torque`.
     """
 
     name: str = "default car"
@@ -154,6 +165,7 @@ class Vehicle:
     steering_torque: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     spread: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Provenance] = field(default_factory=dict)
+    known: Mapping[str, Known] = field(default_factory=dict)
     given: frozenset[str] = frozenset()
 
     @classmethod
@@ -226,6 +238,14 @@ def provenance_lines(vehicle: Vehicle) -> list[str]:
     ]  # fmt: skip
 
 
+def known_lines(vehicle: Vehicle) -> list[str]:
+    """The lines of the table `known` in a vehicle file."""
+    return [
+        f'"{key}" = {{ {", ".join(f"{n} = {v!r}" for n, v in {**fault.values, "spread": fault.spread}.items())} }}'
+        for key, fault in vehicle.known.items()
+    ]
+
+
 def usual(vehicle: Vehicle, key: Key) -> float:
     """The value that a key has where a file does not set it.
 
@@ -261,6 +281,8 @@ def vehicle_toml(vehicle: Vehicle) -> str:
         lines += ["", "[spread]", *spread_lines(vehicle)]
     if vehicle.provenance:
         lines += ["", "[provenance]", *provenance_lines(vehicle)]
+    if vehicle.known:
+        lines += ["", "[known]", *known_lines(vehicle)]
     for section in POLYNOMIALS:
         table = getattr(vehicle, section)
         if table:

@@ -17,7 +17,7 @@ from aqualog.diagnose.outcome import Z
 from aqualog.diagnose.records import AGREES, Agreement, ByDrive, Cause, Estimate
 from aqualog.diagnose.refit import KNOWN, PRIOR_WIDTH, Refit, metric
 from aqualog.diagnose.search import Found
-from aqualog.diagnose.words import cause_sentence
+from aqualog.diagnose.words import cause_sentence, listed
 from aqualog.model.effects import EFFECTS
 
 __all__ = ["agreements", "widened"]
@@ -68,21 +68,44 @@ def agreements(found: Found, r: Refit, base: FloatArray) -> tuple[Agreement, ...
 
 
 def widened(cause: Cause, found: Sequence[Agreement]) -> Cause:
-    """The cause with intervals widened by Birge's ratio (K) where the drives differ more than their errors allow."""
-    parameters = dict(cause.parameters)
+    """The cause with intervals widened by Birge's ratio (K) where the drives differ more than their errors allow.
+
+    An effect that belongs to a drive may differ: if only some drives have it, it has their value and names them.
+    """
+    parameters, only = dict(cause.parameters), ""
     bounds = {p.name: (p.low, p.high) for p in EFFECTS[cause.effect].parameters}
     for a in found:
         if a.key != cause.key or a.p_value >= AGREES or a.parameter not in parameters:
             continue
+        low, high = bounds[a.parameter]
+        own = _having(cause, a)
+        if own:
+            parameters[a.parameter] = _mean([d.alone for d in own], low, high)
+            only = f" In {listed([d.drive for d in own])} only."
+            continue
         e = parameters[a.parameter]
         ratio = math.sqrt(max(_heterogeneity([d.alone for d in a.drives]) / (len(a.drives) - 1), 1.0))
         half = 0.5 * (e.high - e.low) * ratio
-        low, high = bounds[a.parameter]
         parameters[a.parameter] = replace(e, low=max(e.value - half, low), high=min(e.value + half, high))
     if parameters == dict(cause.parameters):
         return cause
     sentence = cause_sentence(EFFECTS[cause.effect], cause.where, parameters)
-    return replace(cause, parameters=parameters, sentence=sentence)
+    return replace(cause, parameters=parameters, sentence=sentence + only)
+
+
+def _having(cause: Cause, a: Agreement) -> list[ByDrive]:
+    """The drives that have an effect of a drive, if others do not; else none."""
+    effect = EFFECTS[cause.effect]
+    neutral = next(p.neutral for p in effect.parameters if p.name == a.parameter)
+    own = [d for d in a.drives if not d.alone.low <= neutral <= d.alone.high]
+    return own if effect.belongs in ("drive", "moment") and len(own) < len(a.drives) else []
+
+
+def _mean(each: Sequence[Estimate], low: float, high: float) -> Estimate:
+    """Weighted mean with its interval, within bounds."""
+    weight = np.array([(2.0 * Z / (e.high - e.low)) ** 2 for e in each])
+    value, half = float(np.average([e.value for e in each], weights=weight)), Z / math.sqrt(float(weight.sum()))
+    return Estimate(min(max(value, low), high), max(value - half, low), min(value + half, high), each[0].unit)
 
 
 def _heterogeneity(each: Sequence[Estimate]) -> float:

@@ -7,8 +7,8 @@ blocks the log of the marginal likelihood that one more block gains is
 
 so that a shape of twelve columns pays for its freedom and a known effect wins where it says the same with one.
 
-No simulator is the car. Its errors are no noise, so with enough samples a likelihood is sure of anything. A share of its
-logarithm counts instead: a coarsened posterior [miller2018].
+No simulator is the car. Its errors are no noise, so with enough samples a likelihood is sure of anything. A share of
+its logarithm counts instead: a coarsened posterior [miller2018].
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from aqualog.core.records import FloatArray
 
 __all__ = ["COARSE", "SCALES", "Block", "State", "added", "scored", "start", "values"]
 
-# share of the log-likelihood that counts in a competition: on drives of two other simulators (50 cases) shares of the posterior are then
-# about as often right as they say (D)
+# share of the log-likelihood that counts in a competition: shares of the posterior are then about as often right as they
+# say, on drives of two other simulators (D)
 COARSE = 0.5
 SCALES = (1.0, 3.0)  # of the usual size: half of all deviations are three times as usual ones (K)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 
 from aqualog.core.vehicle import Vehicle
+from aqualog.diagnose.file_values import deviation, own_sd
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.model.term import Kind
 
@@ -36,8 +37,8 @@ def kind_of(h: Hypothesis, name: str) -> Kind:
 
 
 def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:
-    """Standard deviation of the day-to-day differences of its kind, expressed as a value of this parameter, in its
-    unit.
+    """Standard deviation of the day-to-day differences of its kind and of the file's own values, expressed as a value
+    of this parameter, in its unit.
 
     Parameters
     ----------
@@ -49,12 +50,18 @@ def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:
         At which its drag counts. [m/s]
     """
     row = h.parameter(name).day_to_day
+    own = deviation(h, name, vehicle)
     if row is None:
-        return 0.0
-    gain = vehicle.spread.get("torque_gain", 0.0) / vehicle.torque_gain
+        return own
+
+    def off(key: str) -> float:
+        return math.hypot(vehicle.spread.get(key, 0.0), own_sd(vehicle, key))
+
     sd = {
-        "inertia": math.hypot(vehicle.spread.get("mass", 0.0) / vehicle.mass, gain),
-        "drag": vehicle.spread.get("drag_area", 0.0),
-        "rolling": vehicle.spread.get("rolling_resistance", 0.0),
+        "inertia": math.hypot(off("mass") / vehicle.mass, off("torque_gain") / vehicle.torque_gain),
+        "drag": off("drag_area"),
+        "rolling": off("rolling_resistance"),
     }[row.kind]
-    return row.value(sd, vehicle, h.where, speed)
+    alike = row.value(sd, vehicle, h.where, speed)
+    is_in = h.where is None and row.key  # the file's own value is one of those above
+    return max(alike, own) if is_in else math.hypot(alike, own)

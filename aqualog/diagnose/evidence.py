@@ -12,29 +12,14 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.day_to_day import as_value, day_to_day, kind_of
 from aqualog.diagnose.drive import Drive
-from aqualog.diagnose.hypotheses import Hypothesis
-from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, spectra, whitened
-from aqualog.model.term import Kind
+from aqualog.diagnose.file_values import deviation
+from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
+from aqualog.diagnose.spectrum import weighing
+from aqualog.model.term import Kind, Model
 
-__all__ = ["Evidence", "Stack", "gram_of", "make_evidence", "noises_after", "tolerant", "without_deviations"]
+__all__ = ["Evidence", "make_evidence", "recentred", "tolerant"]
 
-ROUNDS = 200  # rounds of coordinate descent: it converges slowly where deviations look alike
-
-
-@dataclass(frozen=True, slots=True)
-class Stack:
-    """One drive's residual under a model: `residual` (C, n), `mask` (n,), step `dt` [s], `coordinates` (n,) each."""
-
-    residual: FloatArray
-    mask: BoolArray
-    dt: float
-    channels: tuple[str, ...]
-    coordinates: Mapping[str, FloatArray]
-    noise: Noise
-
-    def whitened(self, x: FloatArray) -> FloatArray:
-        """A residual-shaped array (C, n) as unit innovations, flat; inner products are twice log-likelihoods."""
-        return np.asarray(whitened(spectra(bridged(x, self.mask)[None]), self.noise)[0])
+FARTHEST = 2.0  # standard deviations, beyond which a fault is likelier than an error of the file
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +33,6 @@ class Evidence:
     asked: tuple[Hypothesis, ...]
     residuals: tuple[FloatArray, ...]
     signatures: tuple[FloatArray, ...]
-    prepared: tuple[Spectra, ...]
     columns: tuple[tuple[int, ...], ...]
     prior: FloatArray  # (K,) standard deviation of each parameter
     low: FloatArray  # (K,) bounds of its change
@@ -56,9 +40,9 @@ class Evidence:
     smallest: FloatArray
     tolerance: FloatArray  # (K,) deviation of each parameter that is not worth naming
     barred: BoolArray  # (H,) hypotheses that contradict the drives: neither tested nor put into sets
-    spread: FloatArray  # (K,) measured spread between drives of the same car, 0 where it was not measured
+    spread: FloatArray  # (K,) of the same car between drives, where measured, and of the file's own value
     kinds: tuple[Kind, ...]  # (K,) the kind of day-to-day difference that each looks like
-    as_values: FloatArray  # (K,) size of that difference, expressed as its value
+    as_values: FloatArray  # (K,) size of that difference and of the file's errors, expressed as its value
 
     @property
     def count(self) -> int:
@@ -95,14 +79,14 @@ def make_evidence(
             low.append(p.low - now)
             high.append(p.high - now)
             smallest.append(h.worth_naming(name))
-            spread.append(day_to_day(h, name, drives[0].vehicle))
+            car = drives[0].vehicle
+            spread.append(math.hypot(day_to_day(h, name, car), deviation(h, name, car)))
             kinds.append(kind_of(h, name))
-            as_values.append(as_value(h, name, drives[0].vehicle, speed))
-            tolerance.append(h.tolerance_of(name, drives[0].vehicle))
+            as_values.append(as_value(h, name, car, speed))
+            tolerance.append(h.tolerance(name))
     flat = [np.concatenate(list(s)) for s in signatures]
-    prepared = tuple(spectra(bridged(x, d.mask)) for x, d in zip(flat, drives, strict=True))
     return Evidence(
-        tuple(drives), tuple(asked), tuple(residuals), tuple(flat), prepared, tuple(columns), np.array(prior),
+        tuple(drives), tuple(asked), tuple(residuals), tuple(flat), tuple(columns), np.array(prior),
         np.array(low), np.array(high), np.array(smallest), np.array(tolerance), np.zeros(len(asked), dtype=bool),
         np.array(spread), tuple(kinds), np.array(as_values),
     )  # fmt: skip
@@ -126,54 +110,33 @@ def tolerant(evidence: Evidence, gram: FloatArray) -> FloatArray:
     return np.asarray(gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :]))
 
 
-def without_deviations(
-    evidence: Evidence, d: int, residual: FloatArray, columns: Sequence[int], *, farthest: float = math.inf
-) -> FloatArray:
-    """A residual (C, n) of drive d minus the most likely deviations of these columns within their tolerances.
+def recentred(evidence: Evidence, model: Model) -> Model:
+    """The model with the file's own values where these drives most likely have them, if that is far from the file.
 
-    The deviations are the columns' posterior means, theta = (S^-2 + A'A)^-1 A'y; the remainder is y in the metric of
-    `tolerant`. The noise is estimated again after a first round, because the deviations still count as noise in that
-    round. No deviation exceeds `farthest` tolerances: a large effect must not vanish because it has the form of a
-    tolerance.
+    Signatures are straight lines from the values at hand. A gain that is 10 % off bends them by more than the noise,
+    and the bend would get a name. The deviations theta = (S^-2 + A'A)^-1 A'y stay as unsure as they were, around the
+    new values. The noise is estimated again after a first round, in which the deviations still count as noise.
     """
-    drive = evidence.drives[d]
-    k = [c for c in columns if evidence.forgiven[c] > 0.0]
-    left = residual
-    for _ in range(2 if k else 0):
-        noise = fit_noise(left, drive.mask, contrasts(drive.channels))
-        A = whitened(evidence.prepared[d].of(k), noise)
-        y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)[0]
-        theta = _within(A @ A.T + np.diag(evidence.forgiven[k] ** -2.0), A @ y, farthest * evidence.forgiven[k])
-        left = residual - np.tensordot(theta, evidence.signatures[d][k], axes=1)
-    return left
-
-
-def _within(G: FloatArray, b: FloatArray, most: FloatArray) -> FloatArray:
-    """Minimum of theta' G theta / 2 - b' theta with |theta| <= `most`, by coordinate descent. (k,)"""
-    theta = np.clip(np.linalg.solve(G, b), -most, most)
-    if np.all(np.abs(theta) < most):
-        return np.asarray(theta)
-    for _ in range(ROUNDS):
-        for i in range(theta.size):
-            theta[i] += (b[i] - G[i] @ theta) / G[i, i]
-            theta[i] = min(max(theta[i], -most[i]), most[i])
-    return np.asarray(theta)
-
-
-def gram_of(evidence: Evidence, noises: Sequence[Noise], residuals: Sequence[FloatArray]) -> FloatArray:
-    """Whitened inner products of the columns, the residual last, summed over drives."""
-    total: FloatArray | float = 0.0
-    for drive, ready, noise, residual in zip(evidence.drives, evidence.prepared, noises, residuals, strict=True):
-        columns = whitened(ready, noise)
-        y = whitened(spectra(bridged(residual, drive.mask)[None]), noise)
-        rows = np.concatenate([columns, y])
-        total = total + rows @ rows.T
-    return np.asarray(total)
-
-
-def noises_after(evidence: Evidence, residuals: Sequence[FloatArray], theta: Mapping[int, float]) -> list[Noise]:
-    """Noise of each drive's residual after the columns with these values are subtracted."""
-    return [
-        fit_noise(r - sum((v * s[k] for k, v in theta.items()), np.zeros_like(r)), d.mask, contrasts(d.channels))
-        for d, r, s in zip(evidence.drives, residuals, evidence.signatures, strict=True)
-    ]
+    car = evidence.drives[0].vehicle
+    names = [(h, n) for h in evidence.asked for n in h.free]
+    if not any(FARTHEST * deviation(h, n, car) >= h.worth_naming(n) for h, n in names):
+        return model
+    k = np.flatnonzero(evidence.forgiven > 0.0)
+    theta: dict[int, float] = {}
+    for _ in range(2):
+        gram = np.zeros((evidence.count + 1, evidence.count + 1))
+        for r, x, d in zip(evidence.residuals, evidence.signatures, evidence.drives, strict=True):
+            quiet = r - sum((v * x[c] for c, v in theta.items()), np.zeros_like(r))
+            rows = weighing(quiet, d.mask, contrasts(d.channels)).rows(np.concatenate([x, r[None]]))
+            gram += rows @ rows.T
+        inner = gram[np.ix_(k, k)] + np.diag(evidence.forgiven[k] ** -2.0)
+        theta = dict(zip(k.tolist(), np.linalg.solve(inner, gram[k, -1]).tolist(), strict=True))
+    moved = []
+    for c, off in theta.items():
+        h, n = names[c]
+        if (
+            h.worth_naming(n) <= abs(off) <= FARTHEST * deviation(h, n, car)
+            and evidence.low[c] < off < evidence.high[c]
+        ):
+            moved.append((h, {n: value_in(model, h, n) + off}))
+    return with_values(model, moved)

@@ -1,16 +1,20 @@
 """How far the values of a vehicle file may be off themselves, expressed in the parameters of effects.
 
-The key stands in the effect's row: `DayToDay.key` of the whole car, `DriveSearch.unset` of an axle.
+The key stands in the effect's row: `DayToDay.key` of the whole car, `DriveSearch.axle_key` of an axle.
 """
 
 from __future__ import annotations
+
+import math
 
 from aqualog.core.notation import AXLES
 from aqualog.core.provenance import provenance_of, uncertainty
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.model.effects import EFFECTS
+from aqualog.model.term import Model, Term
 
-__all__ = ["calibrated_enough", "deviation", "key_of", "not_calibrated"]
+__all__ = ["calibrated_enough", "deviation", "key_of", "not_calibrated", "own_sd", "with_known"]
 
 _MATTERS = ("mass", "torque_gain", "wheels.r_e_f", "wheels.r_e_r")
 
@@ -20,24 +24,52 @@ def key_of(h: Hypothesis, name: str) -> str:
 
     Each key counts at one place: that of the whole car there, that of an axle at the axle.
     """
-    p, unset = h.parameter(name), h.effect.drive.unset
+    p, start = h.parameter(name), h.effect.drive.axle_key
     if h.where is None and p.day_to_day is not None:
         return p.day_to_day.key
-    return unset[0] + h.where if unset is not None and h.where in AXLES and p is h.effect.parameters[0] else ""
+    return start + h.where if start and h.where in AXLES and p is h.effect.parameters[0] else ""
 
 
 def deviation(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
     """Standard deviation of the file's own value, in the unit of an effect's parameter; 0 where no key holds it.
 
+    The value of a key, of a known fault, or of both.
+
     A share of the value where the parameter multiplies it (`torque_gain`, `tyre_radius`), else in the key's unit.
     Differences between drives (`day_to_day`) are not in it, and independent of it.
     """
-    path = key_of(h, name)
+    path, known = key_of(h, name), vehicle.known.get(h.key)
+    fault = known.spread if known is not None and name == next(iter(known.values)) else 0.0
     if not path:
-        return 0.0
-    p, sd = h.parameter(name), uncertainty(vehicle, path)
+        return fault
+    p, sd = h.parameter(name), own_sd(vehicle, path)
     is_sum = p.neutral == 0.0 and p.unit == KEYS[path].unit
-    return sd if is_sum else sd / float(getattr(vehicle, KEYS[path].name))
+    return math.hypot(fault, sd if is_sum else sd / float(getattr(vehicle, KEYS[path].name)))
+
+
+def own_sd(vehicle: Vehicle, path: str) -> float:
+    """Standard deviation of the file's own value of a key, in the key's unit; 0 for a mass and a gain that are bound.
+
+    A balance of forces shows the ratio of mass and torque gain. Once drives have calibrated one of them, that ratio is
+    known. Both may be off together, which no drive shows. A file that says of no value where it comes from is taken at
+    its word for the keys that it sets.
+    """
+    if not vehicle.provenance and path in vehicle.given:
+        return 0.0
+    return 0.0 if path in ("mass", "torque_gain") and _is_bound(vehicle) else uncertainty(vehicle, path)
+
+
+def _is_bound(vehicle: Vehicle) -> bool:
+    return "calibrated" in {provenance_of(vehicle, path).source for path in ("mass", "torque_gain")}
+
+
+def with_known(model: Model, vehicle: Vehicle) -> Model:
+    """The model with the known faults of the car on top, unless it has them itself."""
+    for key, fault in vehicle.known.items():
+        term = Term(EFFECTS[key.partition("@")[0]], fault.values, key.partition("@")[2] or None)
+        if all((t.effect, t.place) != (term.effect, term.place) for t in model.terms):
+            model = model.with_term(term)
+    return model
 
 
 def calibrated_enough(vehicle: Vehicle) -> tuple[str, ...]:
@@ -45,9 +77,8 @@ def calibrated_enough(vehicle: Vehicle) -> tuple[str, ...]:
 
     A mass that is calibrated binds the torque gain: the drives have shown their ratio.
     """
-    source = {path: provenance_of(vehicle, path).source for path in _MATTERS}
-    bound = {"torque_gain"} if source["mass"] == "calibrated" else set()
-    return tuple(path for path in _MATTERS if source[path] == "guess" and path not in bound)
+    bound = {"torque_gain"} if provenance_of(vehicle, "mass").source == "calibrated" else set()
+    return tuple(p for p in _MATTERS if provenance_of(vehicle, p).source == "guess" and p not in bound)
 
 
 def not_calibrated(vehicle: Vehicle) -> str:

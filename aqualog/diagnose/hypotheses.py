@@ -9,9 +9,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aqualog.core.errors import ConfigError
-from aqualog.core.notation import AXLES, WHEELS
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
-from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import channel_values
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.tolerances import STAND_IN, TOLERANCES, WATER_TOLERANCES
@@ -72,17 +71,6 @@ class Hypothesis:
     @property
     def _own_tolerance(self) -> float | None:
         return self.effect.drive.tolerance_at.get(self.where or "", self.effect.drive.tolerance)
-
-    def tolerance_of(self, name: str, vehicle: Vehicle) -> float:
-        """`tolerance` for this vehicle file: wide for an axle whose key it does not set."""
-        own = self.tolerance(name)
-        if self.effect.drive.unset is None or self.where not in AXLES:
-            return own
-        key, share = self.effect.drive.unset
-        if key + self.where in vehicle.given:
-            return own
-        is_relative = self.parameter(name).unit == "-"
-        return max(own, share * (1.0 if is_relative else float(getattr(vehicle, key.partition(".")[2] + self.where))))
 
     def step(self, name: str) -> float:
         """Step of the finite difference: of the order that is expected, toward the side that has more room."""

@@ -85,8 +85,8 @@ def metric(
 
     Sets are compared with the full tolerances. Values are estimated with the share `KNOWN`: vehicle files usually err
     by less than the tolerances, and a fit that tolerates its own effect would look for it where it hardly shows. The
-    tolerances of the water laws always count `DOUBT` times, whatever the share. The car's drive-to-drive spread counts
-    in full, because this drive deviates by it too.
+    tolerances of the water laws always count `DOUBT` times, whatever the share. The car's drive-to-drive spread and
+    the errors of the file's own values count in full, because this drive deviates by them too.
 
     The columns `beside`, whose values are estimated, are an exception, and so is every effect that looks the same.
     Their spread is not part of the metric; it is added to the variance of the estimated values (`Metric.apart`). Both
@@ -99,6 +99,7 @@ def metric(
     apart[list(beside)] = evidence.as_values[list(beside)]
     sought = {evidence.kinds[c] for c in beside} - {""}
     known = np.where([k in sought for k in evidence.kinds], 0.0, evidence.spread)
+    known[list(beside)] = 0.0
     owner = {c: h for h, columns in zip(evidence.asked, evidence.columns, strict=True) for c in columns}
     shares = np.array([DOUBT if owner[c].of_water else share for c in range(evidence.count)])
     sd = np.maximum(shares * evidence.tolerance, known)

@@ -17,7 +17,8 @@ from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
-from aqualog.diagnose.evidence import Evidence
+from aqualog.diagnose.evidence import Evidence, recentred
+from aqualog.diagnose.file_values import with_known
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, value_in, with_values
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
@@ -29,7 +30,7 @@ from aqualog.diagnose.road import Road
 from aqualog.diagnose.search import Found, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.unknown_term import as_term, short_form
-from aqualog.diagnose.words import verdict_sentence
+from aqualog.diagnose.words import term_words, verdict_sentence
 from aqualog.model.term import Model
 
 __all__ = ["Options", "diagnose"]
@@ -87,10 +88,12 @@ def diagnose(
         If no drive can be used.
     """
     options = options or Options()
-    model = model or Model()
+    given = model or Model()
+    model = with_known(given, vehicle)
     tell = progress or (lambda _text, _share: None)
     tell("preparing", 0.0)
     ready, notes = _prepared(drives, vehicle)
+    notes += tuple(f"Known: {term_words(t)}." for t in model.terms[len(given.terms) :])
     for d in ready:
         defect = accelerometer_defect(d)
         if defect is not None:
@@ -101,7 +104,13 @@ def diagnose(
     if model.terms:
         ready = [led_by(d, model) for d in ready]
     asked, untested = hypotheses(ready, model)
-    evidence = supported(simulated(ready, asked, model, tell))
+    evidence = simulated(ready, asked, model, tell)
+    moved = recentred(evidence, model)
+    if moved != model:
+        notes += _moved(moved, model)
+        model, ready = moved, [led_by(d, moved) for d in ready]
+        evidence = simulated(ready, asked, model, tell)
+    evidence = supported(evidence)
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(found, model)
     outcome, agreed = _by_drive(found, outcome, model)
@@ -141,6 +150,14 @@ def diagnose(
         views=_views(ready, before, after) if options.views else (),
         agreement=agreed if outcome.causes else (),
     )
+
+
+def _moved(moved: Model, model: Model) -> tuple[str, ...]:
+    """A note on each value of the vehicle file that the drives moved."""
+    terms = (t for t in moved.terms if t not in model.terms)
+    return tuple(
+        f"The vehicle file is not sure of it, and the drives move it: {term_words(t)}." for t in terms
+    )  # fmt: skip
 
 
 def _noises(evidence: Evidence, outcome: Outcome) -> list[Noise]:

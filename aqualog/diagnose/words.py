@@ -8,9 +8,9 @@ from string import Formatter
 
 from aqualog.core.units import displayed_unit
 from aqualog.diagnose.records import Cause, Estimate
-from aqualog.model.term import Effect
+from aqualog.model.term import Effect, Term
 
-__all__ = ["cause_sentence", "listed", "name_of", "place", "quantity", "verdict_sentence"]
+__all__ = ["cause_sentence", "listed", "name_of", "place", "quantity", "term_words", "verdict_sentence"]
 
 _PLACES = {
     "fl": "front left wheel", "fr": "front right wheel", "rl": "rear left wheel", "rr": "rear right wheel",
@@ -35,6 +35,13 @@ def quantity(value: float, unit: str, *, change: bool = False) -> str:
 def name_of(effect: str, where: str | None) -> str:
     """`tyre radius (front left wheel)`."""
     return effect.replace("_", " ") + place(where)
+
+
+def term_words(term: Term) -> str:
+    """`tyre radius (front axle): delta -0.0099`."""
+    units = {p.name: p.unit for p in term.effect.parameters}
+    said = (f"{n} {quantity(v, units[n])}" for n, v in term.values.items())
+    return f"{name_of(term.effect.name, term.where)}: {', '.join(said)}"
 
 
 def cause_sentence(effect: Effect, where: str | None, parameters: Mapping[str, Estimate]) -> str:

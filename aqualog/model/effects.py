@@ -199,14 +199,14 @@ _ALL = [
         "motorways to 3-4 % (V, DMRB [dmrb2020])",
         (Parameter("grade", "rad", 0.0, 0.02, -0.2, 0.2, 0.002, "slope angle, uphill positive"),), _road_grade,
         twins=("accelerometer_bias",),
-        drive=DriveSearch(turns=True),
+        drive=DriveSearch(turns=True), belongs="drive",
     ),
     Effect(
         "head_wind", "speed through the air [m/s]", "A head wind of {speed:.1f} m/s blew.", "±5 m/s (K)",
         (Parameter("speed", "m/s", 0.0, 4.0, -25.0, 25.0, 0.5, "against the car positive",
             DayToDay("drag", _as_wind)),),
         _plus(head_wind="speed"), twins=("aero_drag",),
-        drive=DriveSearch((_TORQUE,), turns=True),
+        drive=DriveSearch((_TORQUE,), turns=True), belongs="drive",
     ),
     Effect(
         "aero_drag", "drag area c_w A [m²]", "The drag area is {delta_drag_area:+.2f} m² off.", "roof box +0.2 (K)",
@@ -222,7 +222,7 @@ _ALL = [
             DayToDay("rolling", _as_rolling, "rolling_resistance")),),
         _plus(r_w="delta_r_w"), _WHEEL_PLACES,
         twins=("brake_drag",),
-        drive=DriveSearch((_TORQUE,)),
+        drive=DriveSearch((_TORQUE,)), belongs="drive",
     ),
     Effect(
         "tyre_warmup", "rolling resistance over time", "Cold tyres rolled {extra:.0%} harder at the start.",
@@ -234,6 +234,7 @@ _ALL = [
         _on_plant(lambda p, v, _: p._replace(warmup_extra=p.warmup_extra + v["extra"], warmup_time=v["time_constant"])),
         drive=DriveSearch(
             (_TORQUE,), variants=lambda _: ({"time_constant": 150.0}, {"time_constant": 600.0}), tolerance=0.1),
+        belongs="drive",
     ),
     Effect(
         "water_drag", "drag of film and bow wave on the wheels", "Film and bow wave drag {gain:.2f} times as much.",
@@ -244,7 +245,7 @@ _ALL = [
         drive=DriveSearch((_WATER, _TORQUE)),
         campaign=CampaignSearch(2, (None, "f", "r"), "drag of the water",
             "Film and bow wave drag {0.value:.2f} times as much on {place} " + _SPAN + " as in the model.",
-        ),
+        ), belongs="tyre",
     ),
     Effect(
         "brake_drag", "torque against a wheel [N·m]", "The brake drags with {torque:.0f} N·m.", "a few N·m a wheel (K)",
@@ -269,7 +270,7 @@ _ALL = [
         ("f", "r"), twins=("torque_gain",),
         drive=DriveSearch((_TORQUE,), places=(None, "f", "r"), is_single=True,
             check=Check("weighing", "Weigh the car as it was driven", 30.0, (None,), "delta_mass", 10.0)),
-        less="The car weighed {delta_mass:.0f} kg less than the vehicle file says.",
+        less="The car weighed {delta_mass:.0f} kg less than the vehicle file says.", belongs="drive",
     ),
     Effect(
         "torque_gain", "torque at the wheels over the reported one [-]", "The wheels get {gain:.3f} of the torque.",
@@ -289,7 +290,7 @@ _ALL = [
         ),
         _plus(towed_mass="mass", drag_area="delta_drag_area"),
         twins=("payload_mass", "aero_drag"),
-        drive=DriveSearch((_TORQUE,), count=2, tolerance=0.0),
+        drive=DriveSearch((_TORQUE,), count=2, tolerance=0.0), belongs="drive",
     ),
     Effect(
         "wheel_inertia", "inertia of the wheels [kg·m²]", "A wheel has {delta_inertia:+.2f} kg·m² more inertia.",
@@ -299,7 +300,7 @@ _ALL = [
         _on_plant(lambda p, v, w: p._replace(
             inertia=np.maximum(_changed(p.inertia, w, np.add, v["delta_inertia"]), 0.05))),
         _WHEEL_PLACES, twins=("payload_mass",),
-        drive=DriveSearch((_TORQUE,), tolerance=0.15, unset=("wheels.inertia_", 0.3)),
+        drive=DriveSearch((_TORQUE,), tolerance=0.15, axle_key="wheels.inertia_"),
     ),
     Effect(
         "accelerometer_bias", "accelerometer [m/s²]", "The accelerometer is off by {bias:+.2f} m/s².",
@@ -320,7 +321,7 @@ _ALL = [
         "20 mg short term (V)",
         (Parameter("drift", "m/s^3", 0.0, 5e-4, -0.02, 0.02, 1e-4, "from the start"),),
         _on_channels(lambda c, v: replace(c, drift=c.drift + v["drift"])), ("a_x", "a_y"), "a_x",
-        drive=DriveSearch(places=_PAIR),
+        drive=DriveSearch(places=_PAIR), belongs="drive",
     ),
     Effect(
         "signal_delay", "delay of a signal [s]", "The signal comes {delay:.3f} s late.", "GNSS up to 0.5 s (V)",
@@ -347,10 +348,10 @@ _ALL = [
         "15-50 over tyres (K); temperature, wear (V, Carlson and Gerdes [carlson2005])",
         (Parameter("gain", "-", 1.0, 0.2, 0.2, 2.5, 0.05, "on the dry slope; 50 over 20"),),
         _times(slip_slope="gain"), _WHEEL_PLACES,
-        drive=DriveSearch((_SPEEDS,), by_wheel=True, tolerance=0.05, unset=("tyre.slip_slope_", 0.2)),
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, tolerance=0.05, axle_key="tyre.slip_slope_"),
         campaign=CampaignSearch(5, ("f", "r"), "slip slope",
             "The slip slope of {place} is {0.value:.2f} times the vehicle file's " + _SPAN + ".", driven=True,
-        ),
+        ), belongs="tyre",
     ),
     Effect(
         "slip_stiffness_drift", "slip slope over time [1/s]", "The slip slope changes by {rate:.1e} a second.",
@@ -358,7 +359,7 @@ _ALL = [
         (Parameter("rate", "1/s", 0.0, 2e-4, -0.01, 0.01, 5e-5, "relative, exp(rate t)"),),
         _plus(slip_slope_drift="rate"),
         _WHEEL_PLACES,
-        drive=DriveSearch((_SPEEDS,)),
+        drive=DriveSearch((_SPEEDS,)), belongs="drive",
     ),
     Effect(
         "load_sensitivity", "slip slope over load [-]", "The slip slope follows the load by {delta:+.2f} more.",
@@ -369,7 +370,7 @@ _ALL = [
         drive=DriveSearch((_TORQUE, _SPEEDS), tolerance=0.25),
         campaign=CampaignSearch(4, (None,), "slip slope over load",
             "The load sensitivity of the slip slope differs by {0.value:+.2f} from the tyre model's " + _SPAN + ".",
-        ),
+        ), belongs="tyre",
     ),
     Effect(
         "tyre_radius", "rolling radius [-]", "The tyre has a radius {delta:+.2%} off.", "±0.3 % (D), wear 1 % (K)",
@@ -377,7 +378,7 @@ _ALL = [
         _on_plant(lambda p, v, w: p._replace(
             **{n: _changed(getattr(p, n), w, np.multiply, 1.0 + v["delta"]) for n in ("r_e", "r_l")})),
         _WHEEL_PLACES, twins=("velocity_scale",),
-        drive=DriveSearch((_SPEEDS,), by_wheel=True, unset=("wheels.r_e_", 0.01)),
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, axle_key="wheels.r_e_"), belongs="tyre",
     ),
     Effect(
         "pressure_loss", "radius and slip slope of a tyre that loses its air", "The tyre lost its air.",
@@ -392,7 +393,7 @@ _ALL = [
             leak_radius=_changed(p.leak_radius, w, np.add, v["radius"]),
             leak_slope=_changed(p.leak_slope, w, np.add, v["slope"]), leak_start=v["start"], leak_time=v["duration"])),
         _WHEEL_PLACES, twins=("tyre_radius",),
-        drive=DriveSearch((_SPEEDS,), by_wheel=True, variants=_leaks, tolerance=1e-3),
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, variants=_leaks, tolerance=1e-3), belongs="moment",
     ),
     Effect(
         "tyre_radius_growth", "rolling radius over speed [s^2/m^2]", "The tyre grows with speed.",
@@ -407,7 +408,7 @@ _ALL = [
         (Parameter("length", "m", 0.0, 0.3, 0.0, 3.0, 0.05, "longitudinal and lateral"),),
         _plus(relaxation_length="length"),
         _WHEEL_PLACES, twins=("signal_delay",),
-        drive=DriveSearch((_SPEEDS,), tolerance=0.15),
+        drive=DriveSearch((_SPEEDS,), tolerance=0.15), belongs="tyre",
     ),
     Effect(
         "contact_loss", "lost contact on water [-]", "The water lifts {gain:.2f} times as much of the contact.",
@@ -418,7 +419,7 @@ _ALL = [
         drive=DriveSearch((_WATER,)),
         campaign=CampaignSearch(1, (None, "f", "r"), "lost contact on water",
             "The water lifts {0.value:.2f} times as much of the contact of {place} " + _SPAN + " as in the model.",
-        ),
+        ), belongs="tyre",
     ),
     Effect(
         "track_clearing", "film in the track of the front wheels [m]", "The front wheels leave another film.",
@@ -430,7 +431,7 @@ _ALL = [
         campaign=CampaignSearch(0, (None,), "film in the front wheels' track",
             "The film that the front wheels leave to the rear ones differs by {0.value:+.2f} mm "
             "(95 %: {0.low:+.2f} ... {0.high:+.2f} mm) from the tyre model's.", scale=1e3,
-        ),
+        ), belongs="tyre",
     ),
     Effect(
         "uneven_water", "water of one side", "The {where} track has {depth_gain:.2f} of the water.",
@@ -444,14 +445,14 @@ _ALL = [
         campaign=CampaignSearch(3, ("left", "right"), "water of the track",
             "{Place} has {0.value:.2f} times the depth of the table of runs " + _SPAN + ", and its irregularity is "
             "larger by {1.value:.2f} of the depth (95 %: {1.low:.2f} ... {1.high:.2f}).",
-        ),
+        ), belongs="drive",
     ),
     Effect(
         "clock_skew", "clock of a bus [ppm]", "The clock of the signal runs {skew:.0f} ppm off.",
         "quartz 20-100 ppm (K)",
         (Parameter("skew", "ppm", 0.0, 100.0, -1e5, 1e5, 20.0, "fast positive"),), _clock_skew, _SIGNALS, "v_x",
         twins=("signal_delay",),
-        drive=DriveSearch(places=("v_x", "a_x", "torque_fl"), is_shift=True),
+        drive=DriveSearch(places=("v_x", "a_x", "torque_fl"), is_shift=True), belongs="drive",
     ),
 ]  # fmt: skip
 

@@ -20,6 +20,7 @@ __all__ = [
 ]  # fmt: skip
 
 Kind = Literal["", "inertia", "drag", "rolling"]  # of the differences between drives of the same car
+Belongs = Literal["car", "tyre", "drive", "moment"]
 Need = Literal["water depth", "wheel torque", "wheel speeds"]
 
 Knots = tuple[tuple[float, float], ...]
@@ -68,8 +69,8 @@ class DriveSearch:
     are sought; `variants` are values of the others, by the length of the longest drive [s].
 
     `tolerance`: standard deviation that is not worth naming; None: a third of the smallest size, 0: a car has the
-    effect or not; `tolerance_at` some places. `unset`: start of an axle's key in the vehicle file, which the first
-    parameter changes, and the share by which cars differ where it is not set. `equals`: effects that together look like
+    effect or not; `tolerance_at` some places. `axle_key`: start of an axle's key in the vehicle file, which the first
+    parameter changes. `equals`: effects that together look like
     this one on every log. `check`: how it is read without driving.
 
     `turns`: the sign changes on the way back; `is_shift`: it moves signals in time; `is_relative`: at all its places
@@ -84,7 +85,7 @@ class DriveSearch:
     variants: Callable[[float], Sequence[Mapping[str, float]]] = lambda _: ({},)
     tolerance: float | None = None
     tolerance_at: Mapping[str, float] = field(default_factory=dict)
-    unset: tuple[str, float] | None = None
+    axle_key: str = ""
     equals: tuple[str, ...] = ()
     check: Check | None = None
     turns: bool = False
@@ -166,6 +167,7 @@ class Effect:
     `target`: the quantity that it changes. `places`: where it may sit, as `fl`, `f`, `left`, a signal's name; empty:
     the whole car. `default`: place if none is given (None: the car). `apply` is pure and returns a new setup. `less`:
     sentence for a negative first value, which it shows as positive. `campaign` None: a campaign does not show it.
+    `belongs`: what has it, and so which drives share its value; one of a drive or a moment differs from drive to drive.
     """
 
     name: str
@@ -181,6 +183,7 @@ class Effect:
     less: str = ""
     drive: DriveSearch = DriveSearch()
     campaign: CampaignSearch | None = None
+    belongs: Belongs = "car"
 
     @property
     def of_water(self) -> bool:

@@ -5,7 +5,7 @@ import pytest
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
 from aqualog.core.provenance import TYPICAL, provenance_of, uncertainty
-from aqualog.core.vehicle import KEYS, SOURCES, Provenance, Vehicle, vehicle_toml
+from aqualog.core.vehicle import KEYS, SOURCES, Known, Provenance, Vehicle, vehicle_toml
 
 CONTRACT = """
 name = "sedan RWD"
@@ -243,3 +243,46 @@ def test_faults_of_the_provenance(tmp_path, line, said):
         text = text.replace('wheels.r_e_f = "measured"\n', "\n")
     assert said in vehicle_faults(tmp_path, text)
     assert "provenance is not a table" in vehicle_faults(tmp_path, "provenance = 3")
+
+
+KNOWN = """
+[known]
+"signal_delay@torque" = { delay = 0.03, spread = 0.005 }
+"velocity_scale" = { scale = 1.01 }
+"""
+
+
+def test_known_faults_with_their_usual_place(tmp_path):
+    car = loaded(tmp_path, KNOWN)
+    assert car.known == {
+        "signal_delay@torque": Known({"delay": 0.03}, 0.005), "velocity_scale@v_x": Known({"scale": 1.01}),
+    }  # fmt: skip
+    again = loaded(tmp_path, vehicle_toml(car))
+    assert again.known == car.known
+
+
+@pytest.mark.parametrize(
+    ("line", "fault"),
+    [
+        (
+            '"signal_dely@torque" = { delay = 0.03 }',
+            'unknown effect "signal_dely@torque" (did you mean "signal_delay"?)',
+        ),
+        ('"signal_delay@moon" = { delay = 0.03 }', "signal_delay cannot sit at moon"),
+        ('"signal_delay@torque" = { delay = 30.0 }', "known.signal_delay@torque.delay = 30 is outside -1 ... 2 s"),
+        ('"signal_delay@torque" = { spread = 0.1 }', "has no value; expected { delay = ..., spread = ... }"),
+        ('"signal_delay@torque" = 0.03', "has no value; expected { delay = ..., spread = ... }"),
+        ('"signal_delay@torque" = { delay = 0.03, sd = 1.0 }', 'unknown key "sd"'),
+        ('"signal_delay@torque" = { delay = 0.03, spread = -1.0 }', "spread = -1 is outside 0 ... 3 s"),
+    ],
+)
+def test_a_fault_in_known_names_line_and_what_was_expected(tmp_path, line, fault):
+    with pytest.raises(ConfigError) as error:
+        loaded(tmp_path, f"mass = 1500.0\n[known]\n{line}\n")
+    assert "line 3: " in str(error.value)
+    assert fault in str(error.value)
+
+
+def loaded(tmp_path, text):
+    (tmp_path / "known.toml").write_text(text)
+    return load_vehicle(tmp_path / "known.toml")

@@ -53,3 +53,29 @@ def test_intervals_stay_where_drives_agree_and_grow_by_birges_ratio_where_not():
     wide = widened(cause, [Agreement("payload_mass", "delta_mass", of(70.0, 130.0), 1e-5)]).parameters["delta_mass"]
     ratio = 2.0**0.5 * 30.0 / (9.0 / 1.959964)
     assert (wide.low, wide.high) == pytest.approx((100.0 - 10.0 * ratio, 100.0 + 10.0 * ratio), rel=1e-6)
+
+
+def of_drives(*values):
+    return tuple(
+        ByDrive(f"drive {n}", Estimate(v, v - 9.0, v + 9.0, "kg"), 100.0, 5.0)
+        for n, v in zip("ABC", values, strict=True)
+    )
+
+
+def test_a_load_of_one_drive_has_the_value_of_that_drive_and_names_it():
+    cause = Cause("payload_mass", None, {"delta_mass": Estimate(60.0, 50.0, 70.0, "kg")}, (), "")
+    one = widened(cause, [Agreement("payload_mass", "delta_mass", of_drives(2.0, 180.0, -3.0), 1e-9)])
+    e = one.parameters["delta_mass"]
+    assert (e.value, e.low, e.high) == pytest.approx((180.0, 171.0, 189.0))
+    assert one.sentence.endswith("In drive B only.")
+    two = widened(cause, [Agreement("payload_mass", "delta_mass", of_drives(2.0, 180.0, 100.0), 1e-9)])
+    assert two.parameters["delta_mass"].value == pytest.approx(140.0)
+    assert two.sentence.endswith("In drive B and drive C only.")
+    every = widened(cause, [Agreement("payload_mass", "delta_mass", of_drives(60.0, 180.0, 100.0), 1e-9)])
+    assert "only" not in every.sentence
+
+
+def test_what_belongs_to_the_car_is_in_all_drives():
+    cause = Cause("aero_drag", None, {"delta_drag_area": Estimate(60.0, 50.0, 70.0, "m^2")}, (), "")
+    found = widened(cause, [Agreement("aero_drag", "delta_drag_area", of_drives(2.0, 180.0, -3.0), 1e-9)])
+    assert "only" not in found.sentence

@@ -6,13 +6,14 @@ from functools import cache
 import numpy as np
 import pytest
 
+from aqualog.core.vehicle import Provenance
+from aqualog.diagnose.arena import arena_of
 from aqualog.diagnose.day_to_day import as_value, day_to_day
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.evidence import gram_of, noises_after, tolerant, without_deviations
+from aqualog.diagnose.evidence import gram_of, noises_after, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import simulated
-from aqualog.diagnose.subsets import fit_set, gains_on_top
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 from tests.diagnose.test_drive import CAR, NOISY, signals, term
@@ -25,19 +26,30 @@ def one(name, where=None):
 ASKED = (one("payload_mass"), one("payload_mass", "r"), one("signal_delay", "v_x"))
 
 
-@cache
-def of_mass(sd):
-    """Gain of the payload in the test, its value and its standard deviation."""
-    d = prepare(
-        signals(term("payload_mass", delta_mass=120.0), sensors=NOISY),
-        replace(CAR, spread={"mass": sd} if sd else {}),
-        "a",
-    )
-    evidence = simulated([d], ASKED, Model(), lambda _t, _s: None)
-    noises = noises_after(evidence, evidence.residuals, {0: 120.0})
+def seen(car, asked, value, hidden):
+    """Gain of the first effect, hidden with this value, in the test, its value and its standard deviation."""
+    d = prepare(signals(hidden, sensors=NOISY), car, "a")
+    evidence = simulated([d], asked, Model(), lambda _t, _s: None)
+    noises = noises_after(evidence, evidence.residuals, {0: value})
     gram = tolerant(evidence, gram_of(evidence, noises, evidence.residuals))
-    r = refit(evidence, fit_set(evidence, gram, (0,)), metric(evidence, noises, share=KNOWN, beside=(0,)), Model())
-    return evidence, gains_on_top(evidence, gram, ())[0], float(r.values[0]), float(np.sqrt(r.covariance[0, 0]))
+    arena = arena_of(evidence, ())
+    without = [r - value * s[0] for r, s in zip(evidence.residuals, evidence.signatures, strict=True)]
+    measure = metric(arena, arena.weighed(without), share=KNOWN, beside=(0,))
+    r = refit(evidence, (0,), np.array([0.8 * value]), measure, Model())
+    gain = 0.5 * float(gram[0, -1] ** 2 / gram[0, 0])
+    return evidence, gain, float(r.values[0]), float(np.sqrt(r.covariance[0, 0]))
+
+
+def loaded(car, asked):
+    """The same of a payload of 120 kg."""
+    return seen(car, asked, 120.0, term("payload_mass", delta_mass=120.0))
+
+
+@cache
+def of_mass(sd, source="measured", own=0.0):
+    """The same with a spread between drives, and where the file's own mass comes from."""
+    said = {**CAR.provenance, "mass": Provenance(source, own)}
+    return loaded(replace(CAR, spread={"mass": sd} if sd else {}, provenance=said), ASKED)
 
 
 def test_a_mass_that_differs_from_drive_to_drive_is_in_test_and_interval():
@@ -50,6 +62,14 @@ def test_a_mass_that_differs_from_drive_to_drive_is_in_test_and_interval():
     assert value == pytest.approx(120.0, abs=10.0)
     assert large > 20.0  # seen where the file's mass is this drive's
     assert small < 6.0  # two standard deviations are nothing out of the ordinary
+
+
+def test_a_mass_of_a_data_sheet_is_as_unsure_as_one_that_differs_from_drive_to_drive():
+    for known, sheet in zip(of_mass(60.0)[1:], of_mass(0.0, "data_sheet", 60.0)[1:], strict=True):
+        assert sheet == pytest.approx(known, rel=1e-9)
+    evidence, gain, _, sd = of_mass(60.0, "data_sheet", 80.0)
+    assert evidence.spread[0] == pytest.approx(100.0)  # independent of each other
+    assert (gain < 3.0, 100.0 < sd < 110.0) == (True, True)
 
 
 def test_a_spread_below_the_tolerance_changes_nothing():
@@ -93,30 +113,31 @@ def test_one_difference_of_days_as_a_value_of_all_that_looks_like_it(name, where
     assert as_value(one(name, where), parameter, CAR, 20.0) == 0.0
 
 
+def test_the_errors_of_the_files_own_values_count_in_all_that_looks_like_them():
+    said = {**CAR.provenance, "mass": Provenance("data_sheet", 42.0), "torque_gain": Provenance("guess", 0.04)}
+    said |= {"wheels.inertia_f": Provenance("guess", 0.3), "wheels.r_e_r": Provenance("guess", 0.003)}
+    car = replace(CAR, mass=1400.0, torque_gain=1.0, r_e_r=0.3, spread={"torque_gain": 0.03}, provenance=said)
+    ratio = np.hypot(0.03, 0.05)
+    assert as_value(one("trailer"), "mass", car, 20.0) == pytest.approx(1400.0 * ratio)
+    assert as_value(one("payload_mass", "r"), "delta_mass", car, 20.0) == pytest.approx(1400.0 * ratio)
+    like_load = 1400.0 * ratio / 2 * car.r_l_f**2
+    assert as_value(one("wheel_inertia", "f"), "delta_inertia", car, 20.0) == pytest.approx(np.hypot(like_load, 0.3))
+    assert as_value(one("tyre_radius", "r"), "delta", car, 20.0) == pytest.approx(0.01)
+    assert as_value(one("tyre_radius", "rl"), "delta", car, 20.0) == 0.0
+
+
+def test_a_radius_is_as_unsure_as_the_file_and_once():
+    car = replace(CAR, provenance={**CAR.provenance, "wheels.r_e_r": Provenance("guess", 0.003 * CAR.r_e_r)})
+    asked = tuple(one("tyre_radius", w) for w in ("r", "rl", "rr"))
+    _, gain, value, sd = seen(car, asked, 0.004, term("tyre_radius", "r", delta=0.004))
+    assert value == pytest.approx(0.004, abs=3e-4)
+    assert sd == pytest.approx(0.003, rel=0.1)
+    assert gain < 1.5  # a deviation of 1.3 standard deviations is nothing out of the ordinary
+
+
 @pytest.mark.parametrize("where", [None, "r"])
 def test_a_load_is_as_unsure_as_the_gain_that_looks_like_it(where):
     """And no more: the gain's spread is in its interval once."""
-    d = prepare(
-        signals(term("payload_mass", delta_mass=120.0), sensors=NOISY), replace(CAR, spread={"torque_gain": 0.03}), "a"
-    )
-    evidence = simulated([d], (one("payload_mass", where), one("torque_gain")), Model(), lambda _t, _s: None)
-    noises = noises_after(evidence, evidence.residuals, {0: 120.0})
-    gram = tolerant(evidence, gram_of(evidence, noises, evidence.residuals))
-    r = refit(evidence, fit_set(evidence, gram, (0,)), metric(evidence, noises, share=KNOWN, beside=(0,)), Model())
-    assert 0.03 * CAR.mass < np.sqrt(r.covariance[0, 0]) < 0.035 * CAR.mass
-
-
-def spread_of(evidence):
-    return np.flatnonzero(evidence.spread > 0.0).tolist()
-
-
-def test_what_drives_differ_by_is_nothing_to_look_for():
-    evidence, *_ = of_mass(60.0)
-    left = without_deviations(evidence, 0, evidence.residuals[0], spread_of(evidence))
-    mask, force = evidence.drives[0].mask, evidence.drives[0].channels.index("force_balance")
-    before, after = (float(np.mean(x[force, mask] ** 2)) for x in (evidence.residuals[0], left))
-    gone = evidence.residuals[0] - left
-    assert after < 0.7 * before
-    assert 60.0 < float(np.sum(gone * evidence.signatures[0][0]) / np.sum(evidence.signatures[0][0] ** 2)) < 125.0
-    plain, *_ = of_mass(0.0)
-    assert without_deviations(plain, 0, plain.residuals[0], spread_of(plain)) is plain.residuals[0]
+    car = replace(CAR, spread={"torque_gain": 0.03})
+    _, _, _, sd = loaded(car, (one("payload_mass", where), one("torque_gain")))
+    assert 0.03 * CAR.mass < sd < 0.035 * CAR.mass

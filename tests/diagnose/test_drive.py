@@ -9,7 +9,7 @@ import pytest
 
 from aqualog.core.errors import SignalError
 from aqualog.core.notation import WHEELS
-from aqualog.core.vehicle import Vehicle
+from aqualog.core.vehicle import KEYS, Provenance, Vehicle
 from aqualog.diagnose.channels import CHANNELS, block_means
 from aqualog.diagnose.drive import led_by, prepare
 from aqualog.diagnose.hypotheses import residual
@@ -21,7 +21,9 @@ from aqualog.model.sensors import IDEAL, Channel
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 
-CAR = Vehicle(name="test car", given=frozenset({"drivetrain", "mass"}))
+CAR = Vehicle(
+    name="test car", given=frozenset({"drivetrain", *KEYS}), provenance={k: Provenance("measured", 0.0) for k in KEYS}
+)
 # no braking: the car of the log rolls out
 SPEED = ((0.0, 15.0), (8.0, 15.0), (16.0, 24.0), (28.0, 24.0), (40.0, 20.0), (46.0, 24.0), (58.0, 24.0), (66.0, 30.0), (78.0, 30.0), (90.0, 25.0))  # fmt: skip
 NOISY = replace(

@@ -28,9 +28,8 @@ def of(name, where=None, parameter=None, car=CAR):
 @pytest.mark.parametrize(
     ("name", "where", "sd"),
     [
-        ("payload_mass", None, 10.0),  # [kg]
-        ("payload_mass", "r", 0.0),  # the same key, counted once
-        ("torque_gain", None, 0.012 / 0.8),  # on top of the file's
+        ("payload_mass", None, 0.0),  # bound by the gain that drives have calibrated
+        ("torque_gain", None, 0.0),
         ("aero_drag", None, 0.04 * 0.66),  # [m^2]
         ("rolling_resistance", None, 0.3 * 0.0105),  # not set: a guess; the sum of two coefficients is no share
         ("rolling_resistance", "f", 0.0),
@@ -51,6 +50,20 @@ def of(name, where=None, parameter=None, car=CAR):
 )
 def test_deviation_in_the_unit_of_the_effect(name, where, sd):
     assert of(name, where) == pytest.approx(sd, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("mass", "gain", "of_mass", "of_gain"),
+    [
+        ("measured", "guess", 10.0, 0.2), ("data_sheet", "data_sheet", 42.0, 0.05), ("calibrated", "guess", 0.0, 0.0),
+        ("guess", "calibrated", 0.0, 0.0), ("guess", "guess", 112.0, 0.2),
+    ],
+)  # fmt: skip
+def test_mass_and_gain_are_sure_as_a_ratio_once_drives_have_shown_it(mass, gain, of_mass, of_gain):
+    car = replace(CAR, provenance={"mass": Provenance(mass), "torque_gain": Provenance(gain)})
+    assert of("payload_mass", car=car) == pytest.approx(of_mass)
+    assert of("payload_mass", "r", car=car) == 0.0  # the same key, counted once
+    assert of("torque_gain", car=car) == pytest.approx(of_gain)  # on top of the file's
 
 
 def test_each_key_of_a_row_exists_and_counts_at_one_place():
@@ -79,6 +92,8 @@ def test_a_value_that_is_said_to_be_surer_deviates_less():
     for source in ("data_sheet", "calibrated"):
         car = replace(CAR, provenance={"wheels.r_e_f": Provenance(source)})
         assert of("tyre_radius", "f", car=car) == pytest.approx(uncertainty(car, "wheels.r_e_f") / 0.35)
+    spread = replace(CAR, provenance={}, spread={"drag_area": 0.01})  # only drives of this car show it
+    assert of("aero_drag", car=spread) == pytest.approx(0.04 * 0.66)
     lost = replace(CAR, given=CAR.given - {"wheels.r_e_f"})  # as where wheel speeds are logged in km/h
     assert of("tyre_radius", "f", car=lost) == pytest.approx(0.015)
 

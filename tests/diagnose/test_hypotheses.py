@@ -1,7 +1,5 @@
 """What a log is asked about, and what a unit of each would do: differences of simulations."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -122,22 +120,6 @@ def test_events_are_not_tolerated_and_all_else_is():
     assert one("slip_stiffness", "fl").worth_naming("gain") == 0.1
     assert one("payload_mass").worth_naming("delta_mass") == 20.0
     assert one("accelerometer_bias", "a_y").tolerance("bias") > one("accelerometer_bias", "a_x").tolerance("bias")
-
-
-@pytest.mark.parametrize(
-    ("name", "where", "key", "sd"),
-    [
-        ("tyre_radius", "f", "wheels.r_e_f", 0.01), ("wheel_inertia", "r", "wheels.inertia_r", 0.3 * CAR.inertia_r),
-        ("slip_stiffness", "f", "tyre.slip_slope_f", 0.2),
-    ],
-)  # fmt: skip
-def test_what_the_vehicle_file_does_not_set_is_hardly_known(name, where, key, sd):
-    h = one(name, where)
-    told = replace(CAR, given=frozenset({key}))
-    assert h.tolerance_of(h.free[0], CAR) == pytest.approx(sd)
-    assert h.tolerance_of(h.free[0], told) == h.tolerance(h.free[0]) < sd
-    for other in ("fl", None):  # wheels of one axle are alike, and the whole is the sum of its axles
-        assert replace(h, where=other).tolerance_of(h.free[0], CAR) == replace(h, where=other).tolerance(h.free[0])
 
 
 @pytest.mark.parametrize(

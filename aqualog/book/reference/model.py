@@ -57,8 +57,20 @@ writes it.
 _PROVENANCE = """
 `[provenance]` says where the value of a key comes from: `mass = "measured"`. With a standard deviation of its own it is
 `wheels.r_e_f = { source = "calibrated", sd = 0.0004 }`, in the key's unit. A key that is set without a line here counts
-as `data_sheet`. A key that is not set is a `guess`, and no other source may be given for it. `aqualog calibrate` writes
-what it estimated, and measured for what `--fix` gave.
+as `data_sheet`, with a value in `[spread]` as `calibrated`. A key that is not set is a `guess`, and no other source may
+be given for it. `aqualog calibrate` writes what it estimated, and measured for what `--fix` gave. `aqualog diagnose`
+names nothing that these deviations explain.
+"""
+_KNOWN = """
+`[known]` lists faults of the car that are known: an [effect](effects.md), with `@` and its place, values of its
+parameters, and as `spread` the standard deviation of the first one. `aqualog diagnose` has them in its model from the
+start and in the model it writes, lets them move within the spread and notes them as known. One that is further off is a
+cause, with its new value. `detect`, `simulate` and a campaign do not take them from here: give them `--model`.
+
+```toml
+[known]
+"signal_delay@torque" = { delay = 0.03, spread = 0.005 }
+```
 """
 _PROVENANCE_SD = """
 The standard deviation of a value whose line gives none. [`[spread]`](#spread-between-drives) comes on top.
@@ -91,6 +103,8 @@ def vehicle_page() -> str:
         "## Spread between drives",
         _SPREAD,
         table(("key", "unit", "default", "meaning"), _spread()),
+        "## Known faults",
+        _KNOWN,
         "## Full example",
         "Every key stands in this file. It loads as it is.",
         fence(vehicle_example(), "toml"),
