@@ -66,6 +66,7 @@ def verdict_title(verdict: str) -> str:
 def channel_title(channel: str) -> str:
     """`slip_fl` -> `slip FL`."""
     stem, _, end = channel.rpartition("_")
+    stem = "wheel speed" if stem == "omega" else stem
     if channel in _CHANNELS:
         return _CHANNELS[channel]
     return f"{stem.replace('_', ' ')} {end.upper()}" if end in _WHEELS else channel.replace("_", " ")
