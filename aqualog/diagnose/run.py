@@ -19,6 +19,7 @@ from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.faster import faster, joined, with_rings
+from aqualog.diagnose.file_values import not_calibrated
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, value_in, with_values
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
@@ -144,6 +145,7 @@ def diagnose(
         notes=(*notes, *_unnamed(outcome, found, options), *outcome.small, *seen.notes),
         views=_views(ready, before, after) if options.views else (),
         agreement=agreed if outcome.causes else (),
+        caution=not_calibrated(vehicle),
     )
 
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from aqualog.diagnose import arena, faster, run
-from aqualog.diagnose.faster import Faster, joined, with_rings
-from aqualog.diagnose.full_rate import PerTurn, pooled, to_causes, why_untested, without_known
+from aqualog.diagnose.faster import Faster, joined, pooled, to_causes, why_untested, with_rings, without_known
+from aqualog.diagnose.full_rate import PerTurn
 from aqualog.diagnose.outcome import Outcome
 from aqualog.diagnose.records import Cause
 from aqualog.diagnose.seams import Seam

@@ -12,16 +12,8 @@ from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Origin
-from aqualog.diagnose.full_rate import (
-    PerTurn,
-    _Fit,
-    _lossless,
-    per_turn,
-    remarks,
-    to_causes,
-    wheel_columns,
-    why_untested,
-)
+from aqualog.diagnose.faster import remarks, to_causes, why_untested
+from aqualog.diagnose.full_rate import PerTurn, _Fit, _lossless, per_turn, wheel_columns
 from tests.blind.world.cases import CARS, Hidden, Spec, make_case
 
 CAR = CARS["sedan_rwd"]
