@@ -33,8 +33,8 @@ Members = tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Posterior:
-    """`sets` by evidence with their prior, best first, and `probability` of each; `gram` plain, and `tolerant`, which is
-    coarsened."""
+    """`sets` by evidence with their prior, best first, and `probability` of each; `gram` plain, and `tolerant`, which
+    is coarsened."""
 
     sets: tuple[tuple[Members, float], ...]
     probability: FloatArray

@@ -15,16 +15,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from aqualog.core.intervals import chi2_log_p
-from aqualog.core.notation import AXLES, SIDES, WHEELS
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Origin, Signals
 from aqualog.core.units import is_unit, parse_unit
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.inputs import SPEED_S, smooth
-from aqualog.diagnose.records import Cause, Estimate
-from aqualog.diagnose.words import cause_sentence, place
-from aqualog.model.effects import EFFECTS
 
-__all__ = ["LEVEL", "ORDERS", "PerTurn", "per_turn", "remarks", "to_causes", "wheel_columns"]
+__all__ = ["LEVEL", "ORDERS", "PerTurn", "Z", "per_turn", "wheel_columns"]
 
 ORDERS = (1, 2, 3)
 LEVEL = 0.01  # false alarms per drive, over all wheels and orders
@@ -175,54 +172,6 @@ def per_turn(
                 limit=r.limit * _stricter(tests),
             ))  # fmt: skip
     return tuple(out)
-
-
-def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
-    """What is found once per turn as causes `tone_ring`, those of an axle or a side with one value together.
-
-    Larger than the effect's smallest size only; `remarks` has the rest.
-    """
-    effect = EFFECTS["tone_ring"]
-    smallest = effect.parameters[0].smallest
-    rings = {f.wheel: f for f in found if f.order == 1 and f.kind == "ring" and f.amplitude >= smallest}
-    out = []
-    for where, wheels in (*AXLES.items(), *SIDES.items()):
-        pair = [rings[w] for w in wheels if w in rings]
-        if len(pair) == 2 and max(f.low for f in pair) <= min(f.high for f in pair):
-            out.append((where, pair))
-            for w in wheels:
-                del rings[w]
-    out += [(w, [f]) for w, f in rings.items()]
-    causes = []
-    for where, pair in out:
-        mean = float(np.mean([f.amplitude for f in pair]))
-        half = 0.5 * math.sqrt(sum((f.high - f.low) ** 2 for f in pair)) / len(pair)
-        value = Estimate(mean, max(mean - half, 0.0), mean + half, effect.parameters[0].unit)
-        parameters = {effect.parameters[0].name: value}
-        channels = tuple(f"omega_{f.wheel}" for f in pair)
-        causes.append(Cause(effect.name, where, parameters, channels, cause_sentence(effect, where, parameters)))
-    return tuple(causes)
-
-
-def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
-    """Sentences about what is found and is no cause, and about what the log cannot show."""
-    smallest = EFFECTS["tone_ring"].parameters[0].smallest
-    out = []
-    for f in found:
-        if not f.found or (f.most < smallest if f.kind == "speed" else f.order > 1 and f.amplitude < smallest):
-            continue
-        often = {1: "once", 2: "twice"}.get(f.order, f"{f.order} times")
-        what = f"The wheel speed{place(f.wheel)} varies {often} per turn by {f.amplitude:.2%}"
-        if f.kind == "speed":
-            out.append(f"{what}; {f.reason}: a resonance or the tyre, not the tone ring.")
-        elif f.order > 1:
-            out.append(f"{what} at all speeds: the tyre or the pick-up, not an eccentric ring.")
-        elif f.amplitude < smallest:
-            out.append(f"Significant, but too small to be worth naming: {what[0].lower()}{what[1:]}.")
-    untested = {f.reason for f in found if f.kind == "untested" and f.order == 1}
-    if to_causes(found):
-        out.append("A tyre or rim that runs out of true, by its share of the radius, looks like an uneven tone ring.")
-    return (*out, *(f"Unevenness of the wheels' tone rings is not tested: {r}." for r in sorted(untested)))
 
 
 def _of_order(x: FloatArray, dt: float, origin: Origin | None, window_s: float | None) -> list[PerTurn | str]:

@@ -91,9 +91,9 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     has: dict[Need, bool] = {"water depth": wet, "wheel torque": torque, "wheel speeds": wheels}
     length = max(d.duration_s for d in drives)
     out: list[Hypothesis] = []
-    untested = {e.name: e.drive.never for e in EFFECTS.values() if e.drive.never}
+    untested: dict[str, str] = {}
     for effect in EFFECTS.values():
-        if effect.drive.never:
+        if effect.drive.at_full_rate:
             continue
         missing = next((need for need in effect.drive.needs if not has[need]), None)
         if missing is not None:

@@ -236,7 +236,7 @@ class ResidualView:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """The result. `causes` with `cannot_tell`: the set that the log cannot separate."""
+    """The result. `causes` with `cannot_tell`: the set that the log cannot separate; `caution`: to know before it."""
 
     verdict: Verdict
     sentence: str
@@ -257,3 +257,4 @@ class Diagnosis:
     notes: tuple[str, ...] = ()
     views: tuple[ResidualView, ...] = field(default=(), repr=False)
     agreement: tuple[Agreement, ...] = ()
+    caution: str = ""

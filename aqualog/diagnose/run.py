@@ -18,7 +18,8 @@ from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
 from aqualog.diagnose.evidence import Evidence, recentred
-from aqualog.diagnose.file_values import with_known
+from aqualog.diagnose.faster import faster, joined, with_rings
+from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, value_in, with_values
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
@@ -118,6 +119,9 @@ def diagnose(
     if found.road is not None:
         outcome = _with_road(outcome, found.road)
     extended = _extended(outcome, found, model, asked)
+    names = {d.name for d in ready}
+    seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
+    outcome = joined(outcome, seen)
     sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.inflation, found.calibration.threshold)
     before = list(evidence.residuals)
     after = [_led(d, extended) for d in ready] if extended.terms != model.terms else before
@@ -143,12 +147,13 @@ def diagnose(
         remainders=found.forms,
         manoeuvre=next_run,
         gain=gained,
-        model=extended,
+        model=with_rings(extended, seen),
         channels=ready[0].channels,
-        untested=untested,
-        notes=(*notes, *_unnamed(outcome, found, options), *outcome.small),
+        untested=untested | seen.untested,
+        notes=(*notes, *_unnamed(outcome, found, options), *outcome.small, *seen.notes),
         views=_views(ready, before, after) if options.views else (),
         agreement=agreed if outcome.causes else (),
+        caution=not_calibrated(vehicle),
     )
 
 

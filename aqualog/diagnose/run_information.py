@@ -108,7 +108,8 @@ def of_log(case: Case) -> FloatArray:
         parts = [c.refit.residuals[d][None] for c in case.credible] + [c.refit.signatures[d] for c in case.credible]
         rows = whitened(spectra(bridged(np.concatenate(parts), drive.mask)), noise)
         nothing = np.zeros((1, rows.shape[1]))
-        rows = np.concatenate([rows, nothing, whitened(spectra(bridged(evidence.signatures[d][forgiven], drive.mask)), noise)])
+        own = spectra(bridged(evidence.signatures[d][forgiven], drive.mask))
+        rows = np.concatenate([rows, nothing, whitened(own, noise)])
         total = total + rows @ rows.T
     return np.asarray(total)
 

@@ -332,9 +332,9 @@ _ALL = [
     Effect(
         "tone_ring", "wheel-speed pick-up [-]", "The tone ring of the wheel is uneven by {amplitude:.2%}.",
         "6.8e-4 per tooth (V, Gustafsson [gustafsson2000])",
-        (Parameter("amplitude", "-", 0.0, 0.002, 0.0, 0.05, 0.0005, "once per turn, relative"),), _tone_ring,
+        (Parameter("amplitude", "-", 0.0, 0.002, 0.0, 0.05, 0.002, "once per turn, relative"),), _tone_ring,
         _WHEEL_PLACES,
-        drive=DriveSearch(never="once per turn is faster than the residuals, which are means over 0.1 s"),
+        drive=DriveSearch(at_full_rate=True),
     ),
     Effect(
         "velocity_scale", "reference velocity [-]", "The reference velocity reads {scale:.4f} times the truth.",

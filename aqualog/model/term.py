@@ -64,9 +64,10 @@ class Check:
 class DriveSearch:
     """How a diagnosis of drives searches for an effect.
 
-    `needs`: what a log must hold; `never`: why no log shows it. `places` where it is searched, None the whole car;
-    empty: the car, both axles where it acts on wheels, and with `by_wheel` every wheel. The first `count` parameters
-    are sought; `variants` are values of the others, by the length of the longest drive [s].
+    `needs`: what a log must hold; `at_full_rate`: faster than blocks of 0.1 s, so the search leaves it out.
+    `places` where it is searched, None the whole car; empty: the car, both axles where it acts on wheels, and with
+    `by_wheel` every wheel. The first `count` parameters are sought; `variants` are values of the others, by the
+    length of the longest drive [s].
 
     `tolerance`: standard deviation that is not worth naming; None: a third of the smallest size, 0: a car has the
     effect or not; `tolerance_at` some places. `axle_key`: start of an axle's key in the vehicle file, which the first
@@ -78,7 +79,7 @@ class DriveSearch:
     """
 
     needs: tuple[Need, ...] = ()
-    never: str = ""
+    at_full_rate: bool = False
     places: tuple[str | None, ...] = ()
     by_wheel: bool = False
     count: int = 1

@@ -12,7 +12,8 @@ from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Origin
-from aqualog.diagnose.full_rate import PerTurn, _Fit, _lossless, per_turn, remarks, to_causes, wheel_columns
+from aqualog.diagnose.faster import remarks, to_causes, why_untested
+from aqualog.diagnose.full_rate import PerTurn, _Fit, _lossless, per_turn, wheel_columns
 from tests.blind.world.cases import CARS, Hidden, Spec, make_case
 
 CAR = CARS["sedan_rwd"]
@@ -117,9 +118,7 @@ def test_a_slow_bus_shows_only_slow_wheels():
     slow = found(drive(uneven={"fl": ring(2e-3)}, dt=0.1, low=20.0, high=30.0), 0.1)
     assert {r.kind for r in slow.values()} == {"untested"}
     assert "10 Hz" in slow["fl", 1].reason
-    assert remarks(tuple(slow.values())) == (
-        f"Unevenness of the wheels' tone rings is not tested: {slow['fl', 1].reason}.",
-    )
+    assert why_untested(tuple(slow.values())) == slow["fl", 1].reason
     mixed = found(drive(uneven={"fl": ring(4e-3)}, dt=0.1, low=4.0, high=10.0), 0.1)["fl", 1]
     assert mixed.speed[1] < 0.4 * 10.0 * 2.0 * math.pi * 0.317
     assert mixed.low <= 4e-3 <= mixed.high
@@ -208,9 +207,11 @@ def test_one_speed_cannot_show_a_resonance():
 
 def test_what_is_too_small_is_not_listed():
     """Teeth that are uneven by chance leave some 1e-4 at every order."""
-    small = [PerTurn("fl", k, kind, 1e-4, 9e-5, 1.1e-4, 1e-9, most=2e-4) for k in (2, 3) for kind in ("ring", "speed")]
+    small = [
+        PerTurn("fl", k, kind, 1e-4, 9e-5, 1.1e-4, 1e-9, most=2e-4) for k in (1, 2, 3) for kind in ("ring", "speed")
+    ]
     assert remarks(small) == ()
-    first = remarks([PerTurn("fl", 1, "ring", 1e-4, 9e-5, 1.1e-4, 1e-9)])
+    first = remarks([PerTurn("fl", 1, "ring", 9e-4, 8e-4, 1e-3, 1e-9)])
     assert len(first) == 1
     assert first[0].startswith("Significant, but too small to be worth naming")
 
@@ -233,9 +234,9 @@ def test_causes_by_wheel_axle_and_side():
     )
     assert [c.where for c in to_causes([answer("fl", 3e-3), answer("fr", 3.1e-3)])] == ["f"]
     assert [c.where for c in to_causes([answer("fl", 3e-3), answer("rl", 3e-3)])] == ["left"]
-    assert {c.where for c in to_causes([answer("fl", 3e-3), answer("fr", 2e-3)])} == {"fl", "fr"}
-    assert to_causes([answer("fl", 3e-4)]) == ()
-    assert "too small to be worth naming" in remarks([answer("fl", 3e-4)])[0]
+    assert {c.where for c in to_causes([answer("fl", 3e-3), answer("fr", 2.5e-3)])} == {"fl", "fr"}
+    assert to_causes([answer("fl", 1e-3)]) == ()
+    assert "too small to be worth naming" in remarks([answer("fl", 1e-3)])[0]
     assert "runs out of true" in remarks([answer("fl", 3e-3)])[-1]
 
 
@@ -249,14 +250,14 @@ def test_half_a_second_of_a_drive_of_five_minutes():
 
 @pytest.mark.parametrize(("hidden", "noise"), [("f", "pink"), (None, "quantised")])
 def test_in_another_simulator(hidden, noise):
-    inside = (Hidden("tone_ring", hidden, {"amplitude": 0.002}),) if hidden else ()
+    inside = (Hidden("tone_ring", hidden, {"amplitude": 0.003}),) if hidden else ()
     case = make_case(Spec("mixed", noise, inside, 7, holdout=0, duration_s=120.0))
     signals = case.drives[0][1]
     results = per_turn(wheel_columns(signals), signals.dt, case.vehicle, signals.origins)
     assert [c.where for c in to_causes(results)] == ([hidden] if hidden else [])
     assert {(r.wheel, r.order) for r in results if r.found} == ({("fl", 1), ("fr", 1)} if hidden else set())
     for r in results:
-        assert not r.found or r.low <= 0.002 <= r.high
+        assert not r.found or r.low <= 0.003 <= r.high
 
 
 @pytest.mark.real

@@ -11,6 +11,7 @@ from aqualog.diagnose.probability import tempered
 from aqualog.model.term import Model
 from tests.diagnose.test_unexplained import arena
 
+
 @pytest.mark.parametrize(("last", "speaks"), [(1.0, False), (-1.5, True)])
 def test_a_value_with_another_sign_in_a_third_is_no_name(last, speaks):
     a = arena(3)

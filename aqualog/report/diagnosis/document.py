@@ -91,7 +91,8 @@ def diagnosis_document(
         "channel_units": units,
         "untested": dict(d.untested),
         "criteria": dict(CRITERIA),
-        "notes": [*notes, *d.notes],
+        "caution": d.caution or None,
+        "notes": [*([d.caution] if d.caution else []), *notes, *d.notes],
     }  # fmt: skip
 
 

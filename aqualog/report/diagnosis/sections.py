@@ -9,7 +9,15 @@ from typing import Any
 from aqualog.diagnose.records import ResidualView
 from aqualog.report.diagnosis.figures import plots
 from aqualog.report.diagnosis.views import view_data
-from aqualog.report.diagnosis.words import by_sharpness, channel_title, effect_title, sentences, verdict_title
+from aqualog.report.diagnosis.words import (
+    by_sharpness,
+    chance,
+    channel_title,
+    effect_title,
+    sentences,
+    untested_by_reason,
+    verdict_title,
+)  # fmt: skip
 from aqualog.report.sections import Bar, Bars, Beside, Figures, Headline, Lines, Para, Report, Residuals, Section, Table
 from aqualog.report.values import interval_text, measured, number, percent, pretty_unit
 
@@ -35,20 +43,22 @@ def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] 
     figures = plots(d)
     causes = [x for c in d["causes"] for x in c["explains"]]
     answers = [
-        ("Probability", said["probability"]),
         ("Test", said["test"]),
         ("Gain", said["score"]),
         ("Next", said["manoeuvre"]),
     ]
     head = Headline(said["headline"][0], [(k, x[0]) for k, x in answers if x], verdict_title(d["verdict"]))
     level = percent(d["criteria"]["interval"])
+    settle = Section("What would settle it" if d["verdict"] == "cannot_tell" else "Next drive", [
+        Lines(said["manoeuvre"]),
+        Para(f"Distinguishes: {'; '.join(_separates(d))}" if _separates(d) else ""),
+    ], "next", look="next")  # fmt: skip
     sections = [
+        Section("", [Lines(said["caution"])], "caution", look="problems"),
         Section("", [head], "verdict", look=f"verdict {_LOOKS.get(d['verdict'], 'open')}"),
+        *([settle] if d["verdict"] == "cannot_tell" else []),
         *_on_causes(d, said, level),
-        Section("Next drive", [
-            Lines(said["manoeuvre"]),
-            Para(f"Distinguishes: {'; '.join(_separates(d))}" if _separates(d) else ""),
-        ], "next", look="next"),
+        *([] if d["verdict"] == "cannot_tell" else [settle]),
         Section("Measured minus simulated, before and after", [Residuals()] if views else [], "views-section",
                 "dots: samples; line: median; band: middle 68 % of a bin", where="page"),
         Section("Not explained", [
@@ -58,7 +68,8 @@ def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] 
         *_on_limits(d),
         *_on_isolability(d, said, figures),
         Section("Not tested", [
-            Table(("Effect", "Why"), [(effect_title(k), why) for k, why in d["untested"].items()], "untested", (0, 1)),
+            Table(("Why", "Effects"), [(why, ", ".join(x)) for why, x in untested_by_reason(d).items()],
+                  "untested", (0, 1)),
         ], "untested-section", where="page"),
         Section("Notes", [Lines(said["notes"], most=1000)], "notes", look="problems", where="page"),
         Section("Test", [Lines(said["test"])], where="text"),
@@ -72,11 +83,11 @@ def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] 
 
 def _on_causes(d: Mapping[str, Any], said: Mapping[str, list[str]], level: str) -> list[Section]:
     title = "Possible causes" if d["verdict"] == "cannot_tell" else "Causes" if d["causes"] else "Closest known effects"
-    header = ("Effect", "Parameter", "Value", f"{level} interval", "Unit", "Explains")
+    header = ("Effect", "Probability", "Parameter", "Value", f"{level} interval", "Unit", "Explains")
     same = said["causes_relations"]
     return [
         Section(title, [
-            Table(header, _cause_rows(d["causes"]), "causes", (0, 1, 4, 5)),
+            Table(header, _cause_rows(d["causes"]), "causes", (0, 2, 5, 6)),
             Lines(said["causes"] if d["causes"] else (), where="page"),
             Beside([
                 Section("Drive by drive", [Lines(said["agreement"] if d["causes"] else (), "agreement")]),
@@ -131,7 +142,7 @@ def _on_isolability(d: Mapping[str, Any], said: Mapping[str, list[str]], figures
                 ]),
                 Section(f"Right name in less than {sure} of cases", [Lines(said["confused"], "confused")]),
             ]),
-        ], "isolability-section", _BEFOREHAND, where="page"),
+        ], "isolability-section", _BEFOREHAND, where="page", fold="which effects look alike on this log"),
         Section("Pairs of effects", [Figures([x for x in ("isolability",) if x in figures])], "pairs-section",
                 _BEFOREHAND, where="page", fold="how often each pair of effects would get the right name"),
     ]  # fmt: skip
@@ -152,15 +163,15 @@ def _minutes(seconds: float | None) -> str:
 
 
 def _cause_rows(causes: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
-    """Effect, parameter, value, interval, unit, channels; a cause's name stands in its first row only."""
+    """Effect, probability, parameter, value, interval, unit, channels; a cause's name stands in its first row only."""
     rows: list[tuple[str, ...]] = []
     for c in causes:
         explains = ", ".join(channel_title(x) for x in c["explains"])
         for i, (name, p) in enumerate(c["parameters"].items()):
-            own = (effect_title(c["key"]), explains) if i == 0 else ("", "")
-            rows.append((own[0], name.replace("_", " "), *interval_text(p), pretty_unit(p["unit"]), own[1]))
+            own = (effect_title(c["key"]), chance(c.get("probability")), explains) if i == 0 else ("", "", "")
+            rows.append((*own[:2], name.replace("_", " "), *interval_text(p), pretty_unit(p["unit"]), own[2]))
         if not c["parameters"]:
-            rows.append((effect_title(c["key"]), "", "", "", "", explains))
+            rows.append((effect_title(c["key"]), chance(c.get("probability")), "", "", "", "", explains))
     return rows
 
 

@@ -11,8 +11,8 @@ from aqualog.report.values import interval_text, measured, percent, pretty_unit,
 from aqualog.report.wording import detector_name
 
 __all__ = [
-    "COORDINATES", "by_change", "by_sharpness", "channel_title", "coordinate_title", "effect_title", "limit_sentences",
-    "mechanism_title", "sentences", "verdict_title",
+    "COORDINATES", "by_change", "by_sharpness", "chance", "channel_title", "coordinate_title", "effect_title",
+    "limit_sentences", "mechanism_title", "sentences", "untested_by_reason", "verdict_title",
 ]  # fmt: skip
 
 WORSE = 0.01  # rise of a channel's error that is reported
@@ -66,6 +66,7 @@ def verdict_title(verdict: str) -> str:
 def channel_title(channel: str) -> str:
     """`slip_fl` -> `slip FL`."""
     stem, _, end = channel.rpartition("_")
+    stem = "wheel speed" if stem == "omega" else stem
     if channel in _CHANNELS:
         return _CHANNELS[channel]
     return f"{stem.replace('_', ' ')} {end.upper()}" if end in _WHEELS else channel.replace("_", " ")
@@ -88,19 +89,20 @@ def coordinate_title(name: str) -> str:
 def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
     """All sentences of the page by section.
 
-    `headline` holds one; `test`, `score`, `channels` (error of each, the most changed first), `gain_notes`,
-    `consequences`, `manoeuvre`, `causes` (without the headline), `agreement`, `alternatives`, `relations` (groups of
-    effects that look alike), `relation_sizes` (each with its sizes), `confused`, `unexplained`, `untested`, `notes`
-    hold any number. `causes_relations` and `causes_confused` hold those that involve one of the causes.
+    `caution` holds what to know before the verdict, or nothing. `headline` holds one; `test`, `score`, `channels`
+    (error of each, the most changed first), `gain_notes`, `consequences`, `manoeuvre`, `causes` (without the
+    headline), `agreement`, `alternatives`, `relations` (groups of effects that look alike), `relation_sizes` (each
+    with its sizes), `confused`, `unexplained`, `untested`, `notes` hold any number. `causes_relations` and
+    `causes_confused` hold those that involve one of the causes.
     """
     causes = {c["key"] for c in document["causes"]}
     confused = _confused(document)
     gain = document["gain"] or {"notes": [], "consequences": []}
     channels, worse = _channels(document)
     return {
-        "headline": [document["sentence"] or f"{verdict_title(document['verdict'])}."],
+        "caution": [document["caution"]] if document.get("caution") else [],
+        "headline": [_headline(document)],
         "test": _test(document["significance"]),
-        "probability": _probabilities(document["causes"]),
         "causes": [c["sentence"] for c in document["causes"] if c["sentence"] not in ("", document["sentence"])],
         "alternatives": [_alternative(a) for a in document["alternative_sets"]],
         "relations": _alike(document["isolability"], causes),
@@ -115,7 +117,7 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
         "manoeuvre": _manoeuvre(document["next_manoeuvre"]),
         "agreement": [_agreement(a) for a in document["agreement"]],
         "unexplained": [_unexplained(r) for r in document["unexplained"]],
-        "untested": [f"{effect_title(k)}: {why}" for k, why in document["untested"].items()],
+        "untested": [f"{upper_first(why)}: {', '.join(x)}." for why, x in untested_by_reason(document).items()],
         "notes": list(document["notes"]),
     }
 
@@ -175,7 +177,8 @@ def _alternative(a: Mapping[str, Any]) -> str:
     )
     ratio = a["evidence_ratio"]
     how = f", {short(ratio)} times less likely" if ratio is not None else ""
-    return f"{names}{f': {values}' if values else ''}{how}"
+    chances = ", ".join(filter(None, (chance(c.get("probability")) for c in a["causes"])))
+    return f"{names}{f': {values}' if values else ''}{how}{f', probability {chances}' if chances else ''}"
 
 
 def _agreement(a: Mapping[str, Any]) -> str:
@@ -315,10 +318,38 @@ def mechanism_title(r: Mapping[str, Any]) -> str:
     return titles.get(r.get("mechanism") or "", channel_title(r["channel"]))
 
 
-def _probabilities(causes: Sequence[Mapping[str, Any]]) -> list[str]:
-    """`head wind 0.73, aero drag 0.26`."""
-    known = [f"{effect_title(c['key'])} {c['probability']:.2f}" for c in causes if c.get("probability") is not None]
-    return [", ".join(known)] if known else []
+def untested_by_reason(document: Mapping[str, Any]) -> dict[str, list[str]]:
+    """Titles of the effects that are not tested, by the reason."""
+    out: dict[str, list[str]] = {}
+    for key, why in document["untested"].items():
+        out.setdefault(why, []).append(effect_title(key))
+    return out
+
+
+def chance(probability: float | None) -> str:
+    """`97 %`; never all or nothing; empty if it is not known."""
+    if probability is None:
+        return ""
+    return (
+        "over 99 %" if probability >= 0.995 else "below 1 %" if probability < 0.01 else f"{100.0 * probability:.0f} %"
+    )
+
+
+def _headline(document: Mapping[str, Any]) -> str:
+    """The verdict's sentence with the probability of each cause, and of the first unknown form."""
+    said: str = document["sentence"] or f"{verdict_title(document['verdict'])}."
+    forms = document["unexplained"][:1] if document["verdict"] == "unexplained" else []
+    known = {effect_title(c["key"]): chance(c.get("probability")) for c in document["causes"]}
+    if forms:
+        known = {"the unknown form": chance(forms[0].get("probability"))} | known
+    known = {name: p for name, p in known.items() if p}
+    if not known:
+        return said
+    if len(set(known.values())) == 1:
+        how = f"probability {next(iter(known.values()))}{' each' if len(known) > 1 else ''}"
+    else:
+        how = f"probability of {', of '.join(f'{name} {p}' for name, p in known.items())}"
+    return f"{said.rstrip('.')}; {how}."
 
 
 def _unexplained(r: Mapping[str, Any]) -> str:

@@ -14,7 +14,7 @@ from aqualog.report.diagnosis.sections import diagnosis_report
 from aqualog.report.diagnosis.words import effect_title, limit_sentences, sentences
 from aqualog.report.text import report_text
 from aqualog.report.values import interval_text, measured, ordinary, percent, short
-from tests.report.diagnosis_case import BASE, HOSTILE, IMAGE, MASS, NAN, cases, numbers_in
+from tests.report.diagnosis_case import BASE, HOSTILE, IMAGE, MASS, NAN, RADIUS, cases, numbers_in, remainder
 
 VERDICTS = list(cases())
 
@@ -294,3 +294,63 @@ def test_powers_of_ten_stay_numbers_in_plain_text():
     from aqualog.report.values import ordinary
 
     assert ordinary("p = 1.00·10⁻¹² at 3 m/s²") == "p = 1.00e-12 at 3 m/s²"
+
+
+def test_the_contracts_keys_are_there():
+    probable = replace(MASS, probability=0.973)
+    d = round_trip(document_of("unexplained", causes=(probable,)))
+    assert {"verdict", "causes", "alternatives", "unexplained", "gain", "false_alarm_level", "detection_limits",
+            "next_manoeuvre", "extended_model"} <= set(d)  # fmt: skip
+    assert {"effect", "where", "parameters", "explains", "sentence", "probability"} <= set(d["causes"][0])
+    assert set(d["causes"][0]["parameters"]["delta_mass"]) == {"value", "ci95", "unit"}
+    for r in d["unexplained"]:
+        assert {"channel", "depends_on", "share", "mechanism", "probability", "similar_to"} <= set(r)
+    assert {"channel", "heldout_log_score_gain", "ci95", "heldout"} <= set(d["gain"])
+    m = document_of("cannot_tell")["next_manoeuvre"]
+    assert {"name", "separates", "sentence"} <= set(m)
+
+
+def test_the_first_sentence_bears_the_probability():
+    probable = replace(MASS, probability=0.973)
+    one = sentences(document_of(causes=(probable,)))["headline"][0]
+    assert one == "The car weighed 262 kg more than the vehicle file says; probability 97 %."
+    both = (probable, replace(RADIUS, probability=0.4))
+    two = sentences(document_of("cannot_tell", causes=both))["headline"][0]
+    assert two.endswith("; probability of payload mass 97 %, of tyre radius, FL 40 %.")
+    even = sentences(document_of("compound", causes=(probable, replace(RADIUS, probability=0.973))))["headline"][0]
+    assert even.endswith("; probability 97 % each.")
+    form = replace(remainder(), probability=0.9999)
+    unknown = sentences(document_of("unexplained", remainders=(form,)))["headline"][0]
+    assert unknown.endswith("; probability over 99 %.")
+    assert "probability" not in sentences(document_of("no_effect"))["headline"][0]
+
+
+def test_causes_and_alternatives_bear_their_probabilities():
+    other = replace(BASE.alternatives[0], causes=(replace(RADIUS, probability=0.021),))
+    d = document_of(causes=(replace(MASS, probability=0.973),), alternatives=(other,))
+    text = text_of(d)
+    assert "97 %" in text.split("payload mass", 1)[1]
+    assert sentences(d)["alternatives"][0].endswith("probability 2 %")
+
+
+def test_a_file_that_is_not_calibrated_comes_first():
+    said = "This vehicle file was not calibrated: mass is a guess."
+    d = document_of(caution=said)
+    assert d["notes"][0] == said
+    text = text_of(d)
+    assert 0 <= text.index(said) < text.index(MASS.sentence.rstrip("."))
+    assert document_of()["notes"][0] != ""
+
+
+def test_what_would_settle_it_stands_beneath_the_verdict():
+    titles = [s.title for s in diagnosis_report(document_of("cannot_tell")).sections if s.title]
+    assert titles[0] == "What would settle it"
+    assert "What would settle it" not in [s.title for s in diagnosis_report(document_of("named")).sections]
+
+
+def test_untested_effects_are_grouped_by_reason():
+    why = "no wheel torque in the log"
+    d = document_of(untested={"payload_mass": why, "torque_gain": why, "water_drag": "no water depth in the log"})
+    assert sentences(d)["untested"] == [
+        "No wheel torque in the log: payload mass, torque gain.", "No water depth in the log: water drag.",
+    ]  # fmt: skip

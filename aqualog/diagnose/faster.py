@@ -1,0 +1,194 @@
+"""What a log shows faster than the blocks of the search, joined to the verdict: uneven tone rings, seams of the log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from statistics import NormalDist
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.core.notation import AXLES, SIDES, WHEELS
+from aqualog.core.records import Signals
+from aqualog.core.vehicle import Vehicle
+from aqualog.diagnose.full_rate import LEVEL, Kind, PerTurn, Z, per_turn, wheel_columns
+from aqualog.diagnose.outcome import Outcome
+from aqualog.diagnose.probability import SURE
+from aqualog.diagnose.records import Cause, Estimate, Verdict
+from aqualog.diagnose.seams import seams
+from aqualog.diagnose.words import cause_sentence, place
+from aqualog.model.effects import EFFECTS
+from aqualog.model.term import Model, Term
+
+__all__ = [
+    "Faster", "faster", "joined", "pooled", "remarks", "to_causes", "why_untested", "with_rings", "without_known",
+]  # fmt: skip
+
+SHOWN = 5e-4  # smallest amplitude that is worth a remark
+SOUND = 20.0  # cars without a fault of this kind for one with it (K)
+_RING = EFFECTS["tone_ring"]
+
+
+class Faster(NamedTuple):
+    """Causes of all drives together, sentences on what is no cause, and why an effect cannot be tested, by name."""
+
+    causes: tuple[Cause, ...] = ()
+    notes: tuple[str, ...] = ()
+    untested: dict[str, str] = {}  # noqa: RUF012 (a default that nobody changes)
+
+
+def faster(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, model: Model, *, seed: int = 1) -> Faster:
+    """Look at the signals at their own rate.
+
+    Parameters
+    ----------
+    drives : sequence of (name, Signals)
+        Those of the diagnosis: one car in one state, so that a ring is the same in all of them.
+    vehicle : Vehicle
+    model : Model
+        Rings that it has are known, and are no finding at that size.
+    seed : int
+        Of the permutations that calibrate the search for seams.
+    """
+    found = pooled([per_turn(wheel_columns(s), s.dt, vehicle, s.origins) for _, s in drives])
+    found = without_known(found, _known(model))
+    causes = to_causes(found)
+    notes = [f"Not named (probability {c.probability:.2f}): {c.sentence}" for c in causes if c.probability < SURE]
+    notes += remarks(found)
+    for name, s in drives:
+        own = f"{name}: " if len(drives) > 1 else ""
+        notes += [own + seam.sentence for seam in seams(s, vehicle, seed=seed)]
+    reason = why_untested(found)
+    named = tuple(c for c in causes if c.probability >= SURE)
+    return Faster(named, tuple(notes), {_RING.name: reason} if reason else {})
+
+
+def joined(outcome: Outcome, seen: Faster) -> Outcome:
+    """The outcome with the causes beside its own: they act on no residual of the search, so neither hides the other."""
+    if not seen.causes:
+        return outcome
+    verdict: Verdict = outcome.verdict
+    causes = (*outcome.causes, *seen.causes)
+    if verdict in ("no_effect", "named", "compound"):
+        verdict = "named" if len(causes) == 1 else "compound"
+    return outcome._replace(verdict=verdict, causes=causes, certain=outcome.certain | {c.effect for c in seen.causes})
+
+
+def with_rings(model: Model, seen: Faster) -> Model:
+    """The model with the rings that were found, in place of those that it has at the same wheels."""
+    terms = list(model.terms)
+    for c in seen.causes:
+        terms = [t for t in terms if t.effect is not _RING or t.place != c.where]
+        terms.append(Term(_RING, {n: e.value for n, e in c.parameters.items()}, c.where))
+    return Model(tuple(terms))
+
+
+def _known(model: Model) -> dict[str, float]:
+    """Amplitude by wheel that the model's own terms give."""
+    out: dict[str, float] = {}
+    for t in model.terms:
+        if t.effect is _RING:
+            for w in WHEELS:
+                if w == t.place or t.place in (w[0], {"l": "left", "r": "right"}[w[1]]):
+                    out[w] = out.get(w, 0.0) + t.values.get("amplitude", 0.0)
+    return out
+
+
+def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
+    """What is found once per turn as causes `tone_ring`, those of an axle or a side with one value together.
+
+    Larger than the effect's smallest size only; `remarks` has the rest.
+    """
+    effect = EFFECTS["tone_ring"]
+    smallest = effect.parameters[0].smallest
+    rings = {f.wheel: f for f in found if f.order == 1 and f.kind == "ring" and f.amplitude >= smallest}
+    out = []
+    for where, wheels in (*AXLES.items(), *SIDES.items()):
+        pair = [rings[w] for w in wheels if w in rings]
+        if len(pair) == 2 and max(f.low for f in pair) <= min(f.high for f in pair):
+            out.append((where, pair))
+            for w in wheels:
+                del rings[w]
+    out += [(w, [f]) for w, f in rings.items()]
+    causes = []
+    for where, pair in out:
+        mean = float(np.mean([f.amplitude for f in pair]))
+        half = 0.5 * math.sqrt(sum((f.high - f.low) ** 2 for f in pair)) / len(pair)
+        value = Estimate(mean, max(mean - half, 0.0), mean + half, effect.parameters[0].unit)
+        parameters = {effect.parameters[0].name: value}
+        channels = tuple(f"omega_{f.wheel}" for f in pair)
+        sentence = cause_sentence(effect, where, parameters)
+        causes.append(Cause(effect.name, where, parameters, channels, sentence, _probability(pair, value, smallest)))
+    return tuple(causes)
+
+
+def _probability(wheels: Sequence[PerTurn], value: Estimate, smallest: float) -> float:
+    """That it is there and larger than what sound wheels show.
+
+    There: from the p-value of each wheel by the bound -e p ln p on the evidence for chance, of Sellke, Bayarri and
+    Berger (2001). Larger: from the interval, as of a normal distribution.
+    """
+    there = 1.0
+    for f in wheels:
+        p = min(max(f.p_value, 1e-300), math.exp(-1.0))
+        there *= 1.0 / (1.0 - SOUND * math.e * p * math.log(p))
+    sd = max((value.value - value.low) / Z, 1e-12)
+    return there * NormalDist().cdf((value.value - smallest) / sd)
+
+
+def pooled(by_drive: Sequence[Sequence[PerTurn]]) -> tuple[PerTurn, ...]:
+    """Drives of one car together: amplitudes weighted by their intervals, the smallest p-value times the drives."""
+    drives: dict[tuple[str, int], list[PerTurn]] = {}
+    for f in (f for found in by_drive for f in found):
+        drives.setdefault((f.wheel, f.order), []).append(f)
+    return tuple(_together(own) for own in drives.values())
+
+
+def _together(own: Sequence[PerTurn]) -> PerTurn:
+    tested = [f for f in own if f.kind != "untested"]
+    if len(tested) < 2:
+        return (tested or own)[0]
+    surest = min(tested, key=lambda f: f.p_value)
+    p = min(1.0, surest.p_value * len(tested))
+    weight = np.array([max(f.high - f.low, 1e-9) ** -2.0 for f in tested])
+    weight /= weight.sum()
+    mean = float(weight @ [f.amplitude for f in tested])
+    half = 0.5 * math.sqrt(float(weight**2 @ [(f.high - f.low) ** 2 for f in tested]))
+    kind: Kind = "nothing" if p > LEVEL else "speed" if any(f.kind == "speed" for f in tested) else "ring"
+    return replace(surest, kind=kind, amplitude=mean, low=max(mean - half, 0.0), high=mean + half, p_value=p)
+
+
+def without_known(found: Sequence[PerTurn], known: Mapping[str, float]) -> tuple[PerTurn, ...]:
+    """Without what a model's tone rings give already, by wheel: no more than the smallest size from it."""
+    smallest = EFFECTS["tone_ring"].parameters[0].smallest
+    return tuple(f for f in found if f.order > 1 or abs(f.amplitude - known.get(f.wheel, math.inf)) >= smallest)
+
+
+def why_untested(found: Sequence[PerTurn]) -> str:
+    """Why no wheel could be tested; empty if one was, or if a model knows the rings of all others."""
+    once = [f for f in found if f.order == 1]
+    if not found:
+        return "no wheel speeds in the log"
+    return "" if any(f.kind != "untested" for f in once) else " and ".join(sorted({f.reason for f in once}))
+
+
+def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
+    """Sentences about what is found and is no cause."""
+    smallest = EFFECTS["tone_ring"].parameters[0].smallest
+    out = []
+    for f in found:
+        if not f.found or (f.most if f.kind == "speed" else f.amplitude) < SHOWN:
+            continue
+        often = {1: "once", 2: "twice"}.get(f.order, f"{f.order} times")
+        what = f"The wheel speed{place(f.wheel)} varies {often} per turn by {f.amplitude:.2%}"
+        if f.kind == "speed":
+            out.append(f"{what}; {f.reason}: a resonance or the tyre, not the tone ring.")
+        elif f.order > 1:
+            out.append(f"{what} at all speeds: the tyre or the pick-up, not an eccentric ring.")
+        elif f.amplitude < smallest:
+            out.append(f"Significant, but too small to be worth naming: {what[0].lower()}{what[1:]}.")
+    if to_causes(found):
+        out.append("A tyre or rim that runs out of true, by its share of the radius, looks like an uneven tone ring.")
+    return tuple(out)
