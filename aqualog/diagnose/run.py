@@ -21,13 +21,13 @@ from aqualog.diagnose.evidence import Evidence, recentred
 from aqualog.diagnose.faster import faster, joined, with_rings
 from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
+from aqualog.diagnose.grade import Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, value_in, with_values
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.outcome import Outcome, conclude, with_causes
 from aqualog.diagnose.probability import SURE
 from aqualog.diagnose.records import Agreement, Consequence, Diagnosis, Gain, ResidualView, Verdict
-from aqualog.diagnose.road import Road
 from aqualog.diagnose.search import Found, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.unknown_term import as_term, short_form
@@ -104,11 +104,18 @@ def diagnose(
         return _not_testable(ready, model, f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed", notes)
     if model.terms:
         ready = [led_by(d, model) for d in ready]
+    road = find_profile(ready[0], residual(ready[0], model)) if len(ready) == 1 else None
+    bare = model
+    if road is not None:
+        # named or not: a car needs more torque uphill, and the torque would appear to be the cause
+        model = with_profile(model, road)
+        ready = [led_by(d, model) for d in ready]
     asked, untested = hypotheses(ready, model)
     evidence = simulated(ready, asked, model, tell)
     moved = recentred(evidence, model)
     if moved != model:
         notes += _moved(moved, model)
+        bare = Model((*bare.terms, *(t for t in moved.terms if t not in model.terms)))
         model, ready = moved, [led_by(d, moved) for d in ready]
         evidence = simulated(ready, asked, model, tell)
     evidence = supported(evidence)
@@ -116,19 +123,20 @@ def diagnose(
     outcome = conclude(found, model)
     outcome, agreed = _by_drive(found, outcome, model)
     noises = _noises(evidence, outcome)
-    if found.road is not None:
-        outcome = _with_road(outcome, found.road)
-    extended = _extended(outcome, found, model, asked)
+    if road is not None:
+        outcome = _with_road(outcome, road)
+    is_named = any(c.effect == "road_grade" and "grade_rms" in c.parameters for c in outcome.causes)
+    extended = _extended(outcome, found, model if is_named else bare, asked)
     names = {d.name for d in ready}
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
     outcome = joined(outcome, seen)
     sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.inflation, found.calibration.threshold)
-    before = list(evidence.residuals)
-    after = [_led(d, extended) for d in ready] if extended.terms != model.terms else before
+    before = list(evidence.residuals) if road is None else [_led(d, bare) for d in ready]
+    after = before if extended.terms == bare.terms else [_led(d, extended) for d in ready]
     gained = None
-    if extended.terms != model.terms:
+    if extended.terms != bare.terms:
         tell("measuring the gain", 0.88)
-        gained = _gained(ready, holdout, vehicle, model, extended, noises[0], options)
+        gained = _gained(ready, holdout, vehicle, bare, extended, noises[0], options)
     next_run = None
     if outcome.verdict == "cannot_tell":
         tell("searching for a run that distinguishes the causes", 0.95)
@@ -212,9 +220,9 @@ def _led(drive: Drive, model: Model) -> FloatArray:
     return residual(led_by(drive, model), model)
 
 
-def _with_road(outcome: Outcome, road: Road) -> Outcome:
+def _with_road(outcome: Outcome, road: Profile) -> Outcome:
     cause, own = road.cause, outcome.causes
-    if not road.named or cause.probability < SURE:
+    if not road.is_large or cause.probability < SURE:
         note = f"Not named (probability {cause.probability:.2f}): {cause.sentence}"
         return outcome._replace(small=(*outcome.small, note))
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
@@ -252,8 +260,6 @@ def _extended(outcome: Outcome, found: Found, model: Model, asked: Sequence[Hypo
             if h.key in named
         ])  # fmt: skip
     terms = [as_term(r) for r in found.forms]
-    if found.road is not None and "road_grade" in named:
-        terms.append(found.road.term)
     for term in terms:
         if term is not None and all(t.effect is not term.effect for t in extended.terms):
             extended = extended.with_term(term)

@@ -25,7 +25,6 @@ from aqualog.diagnose.evidence import Evidence, make_evidence, tolerant
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
-from aqualog.diagnose.road import Road, road_of, roads_in
 from aqualog.diagnose.subsets import compatible, imitations
 from aqualog.diagnose.unexplained import unknown_forms
 from aqualog.model.term import Model
@@ -36,6 +35,7 @@ AROUND = 2  # times that the competition is repeated around its best set
 COVERED, REFITTED = 0.98, 6  # share of the posterior that is refitted, and the most sets
 # share of the best set's gain by which the form of a water law may have misjudged another effect of water
 FORM = 0.3
+HALF = 0.5  # probability from which a slope or bank of the road is marginalised
 UNUSUAL = 3.0  # of its prior's standard deviations, beyond which a value is not listed by a relation alone
 
 Tell = Callable[[str, float], None]
@@ -65,7 +65,6 @@ class Found:
     posterior: Posterior
     forms: tuple[Remainder, ...] = ()
     options: tuple[Option, ...] = ()
-    road: Road | None = None
 
 
 def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model, tell: Tell) -> Evidence:
@@ -103,18 +102,20 @@ def search(
     test = significance(evidence, gram, calibration, level)
     forms = unknown_forms(arena, posterior, seed=seed)
     if forms:
-        return Found(test, gram, calibration, arena, posterior, forms, road=road_of(arena, posterior, seed=seed))
+        return Found(test, gram, calibration, arena, posterior, forms)
     tell("known effects", 0.6)
-    road = road_of(arena, posterior, seed=seed)
     if test.p_value > level:
-        return Found(test, gram, calibration, arena, posterior, road=road)
-    arena = known_only(arena, roads_in(arena, posterior))
+        return Found(test, gram, calibration, arena, posterior)
+    roads = [
+        b for i, b in enumerate(arena.blocks) if b.kind == "road" and posterior.blocks.get(i, 0.0) >= HALF
+    ]  # fmt: skip
+    arena = known_only(arena, roads)
     posterior = compete(arena)
     arena, posterior = _repeated(evidence, arena, posterior, model)
     tell("refitting in the simulator", 0.7)
     options = _refitted(evidence, arena, posterior, model)
     options = sorted(options, key=lambda o: -o.evidence)
-    return Found(test, gram, calibration, arena, posterior, (), tuple(options), road)
+    return Found(test, gram, calibration, arena, posterior, (), tuple(options))
 
 
 def _effects(arena: Arena, members: Members) -> list[int]:

@@ -95,15 +95,20 @@ def test_without_torque_a_wandering_accelerometer_is_no_road(hilly):
     assert found is None or "cannot be distinguished" in found.cause.sentence
 
 
-def test_a_road_too_small_to_be_named_is_in_the_model_all_the_same(hilly):
-    drive, _, found = hilly
-    small = run._road([drive], with_profile(Model(), replace(found, theta=0.6 * found.theta)))
-    assert 0.005 < small.rms.value < run.HILLY
-    nothing = Outcome("no_effect", (), (), None, ())
-    silent = run._with_road(nothing, small, named=False)
+def test_a_road_too_small_to_be_named_is_a_note(hilly):
+    _, _, found = hilly
+    small = replace(found, rms=Estimate(0.01, 0.009, 0.011, "rad"))
+    silent = run._with_road(Outcome("no_effect", ()), small)
     assert (silent.verdict, silent.causes) == ("no_effect", ())
-    assert "too small" in silent.small[0]
-    assert run._with_road(nothing, small, named=True).verdict == "named"
+    assert "Not named" in silent.small[0]
+    assert run._with_road(Outcome("no_effect", ()), found).verdict == "named"
+
+
+def test_probability_grows_with_the_correlation_of_both_channels(hilly):
+    _, _, found = hilly
+    assert found.probability > 0.99
+    assert replace(found, p_value=0.05).probability < 0.6
+    assert replace(found, p_value=float("nan")).probability < 0.95
 
 
 def test_profile_and_mean_are_one_road(hilly):
@@ -111,9 +116,9 @@ def test_profile_and_mean_are_one_road(hilly):
     grade = Estimate(0.012, 0.008, 0.016, "rad")
     mean = Cause("road_grade", None, {"grade": grade}, ("kinematic",), "The road climbs by 1.2%.")
     late = Cause("signal_delay", "a_x", {}, ("kinematic",), "The signal comes late.")
-    alone = run._with_road(Outcome("named", (mean,), (), None, ()), found, named=True)
-    both = run._with_road(Outcome("compound", (late, mean), (), None, ()), found, named=True)
-    open_ = run._with_road(Outcome("cannot_tell", (mean, late), (), None, ()), found, named=True)
+    alone = run._with_road(Outcome("named", (mean,)), found)
+    both = run._with_road(Outcome("compound", (late, mean)), found)
+    open_ = run._with_road(Outcome("cannot_tell", (mean, late)), found)
     assert (alone.verdict, [c.key for c in alone.causes]) == ("named", ["road_grade"])
     assert (both.verdict, [c.key for c in both.causes]) == ("compound", ["signal_delay@a_x", "road_grade"])
     assert alone.causes[0].parameters == {"grade_rms": found.rms, "grade_mean": found.mean}

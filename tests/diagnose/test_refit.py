@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from aqualog.diagnose.arena import arena_of
+from aqualog.diagnose.compete import compete, fitted
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.evidence import gram_of, noises_after, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
-from aqualog.diagnose.refit import KNOWN, metric, refit, whitened_residual
+from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import simulated
-from aqualog.diagnose.subsets import SetFit, fit_set
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 from tests.diagnose.test_drive import CAR, NOISY, signals, term
@@ -21,13 +21,15 @@ def one(name, where=None):
 def prepared(asked, *terms, seed=3, model=Model()):  # noqa: B008 - frozen
     d = prepare(signals(*terms, sensors=NOISY, seed=seed), CAR, "a")
     evidence = simulated([d], asked, model, lambda _t, _s: None)
-    fit = None
-    theta = {}
-    for _ in range(2):
-        noises = noises_after(evidence, evidence.residuals, theta)
-        fit = fit_set(evidence, gram_of(evidence, noises, evidence.residuals), range(len(asked)))
-        theta = {} if fit is None else dict(zip(fit.columns, fit.theta.tolist(), strict=True))
-    return evidence, fit, metric(evidence, noises, share=KNOWN)
+    arena = arena_of(evidence, ())
+    posterior = compete(arena)
+    members = tuple(range(len(arena.blocks)))
+    fit = fitted(arena, posterior.tolerant, members)
+    return evidence, fit.mean * arena.sd[fit.columns], metric(arena, posterior.weighings, share=KNOWN)
+
+
+def refitted(evidence, start, measure, model=Model()):  # noqa: B008 - frozen
+    return refit(evidence, range(len(evidence.asked)), start, measure, model)
 
 
 @pytest.mark.parametrize(
@@ -40,8 +42,8 @@ def prepared(asked, *terms, seed=3, model=Model()):  # noqa: B008 - frozen
     ids=["mass", "delay", "slip stiffness"],
 )
 def test_a_value_is_recovered_within_its_interval(hidden, h, true):
-    evidence, fit, measure = prepared([h], hidden)
-    r = refit(evidence, fit, measure, Model())
+    evidence, start, measure = prepared([h], hidden)
+    r = refitted(evidence, start, measure)
     sd = float(np.sqrt(r.covariance[0, 0]))
     neutral = h.parameter(h.free[0]).neutral
     assert sd < 0.1 * abs(true - neutral)
@@ -52,10 +54,10 @@ def test_a_value_is_recovered_within_its_interval(hidden, h, true):
 
 def test_two_values_are_recovered_together():
     asked = [one("payload_mass"), one("accelerometer_bias", "a_x")]
-    evidence, fit, measure = prepared(
+    evidence, start, measure = prepared(
         asked, term("payload_mass", delta_mass=250.0), term("accelerometer_bias", "a_x", bias=-0.2)
     )
-    r = refit(evidence, fit, measure, Model())
+    r = refitted(evidence, start, measure)
     sd = np.sqrt(np.diag(r.covariance))
     assert np.all(np.abs(r.values - [250.0, -0.2]) < 3.0 * sd)
     assert np.all(sd < [25.0, 0.03])
@@ -63,32 +65,32 @@ def test_two_values_are_recovered_together():
 
 def test_the_simulator_corrects_what_the_linear_start_got_wrong():
     h = one("slip_stiffness", "rl")
-    evidence, fit, measure = prepared([h], term("slip_stiffness", "rl", gain=0.8))
-    y = whitened_residual(evidence, measure.noises, evidence.residuals)[None]
-    r = refit(evidence, fit, measure, Model())
-    assert abs(r.values[0] - 0.8) < 0.2 * abs(1.0 + fit.theta[0] - 0.8)
+    evidence, start, measure = prepared([h], term("slip_stiffness", "rl", gain=0.8))
+    y = measure.rows([r[None] for r in evidence.residuals])
+    r = refitted(evidence, start, measure)
+    assert abs(r.values[0] - 0.8) < 0.2 * abs(1.0 + start[0] - 0.8)
     assert r.loss < float(measure.inner(y, y)[0, 0])
 
 
 def test_a_linear_start_that_is_far_off_is_corrected_too():
     # slip goes with one over the slope: the linear value is 0.26
     h = one("slip_stiffness", "rl")
-    evidence, fit, measure = prepared([h], term("slip_stiffness", "rl", gain=0.6))
-    assert refit(evidence, fit, measure, Model()).values[0] == pytest.approx(0.6, abs=0.02)
+    evidence, start, measure = prepared([h], term("slip_stiffness", "rl", gain=0.6))
+    assert refitted(evidence, start, measure).values[0] == pytest.approx(0.6, abs=0.02)
 
 
 def test_a_start_far_away_ends_at_the_same_value():
     h = one("payload_mass")
-    evidence, fit, measure = prepared([h], term("payload_mass", delta_mass=250.0))
-    near = refit(evidence, fit, measure, Model())
-    far = refit(evidence, SetFit(fit.members, fit.columns, np.array([-100.0]), fit.gain), measure, Model())
+    evidence, start, measure = prepared([h], term("payload_mass", delta_mass=250.0))
+    near = refitted(evidence, start, measure)
+    far = refitted(evidence, np.array([-100.0]), measure)
     assert far.values[0] == pytest.approx(near.values[0], abs=0.3 * float(np.sqrt(near.covariance[0, 0])))
 
 
 def test_a_value_stops_at_its_bound():
     # a trailer cannot weigh less than nothing: a car that is lighter is no trailer
     evidence, _, measure = prepared([one("trailer"), one("aero_drag")], term("payload_mass", delta_mass=-200.0))
-    r = refit(evidence, SetFit((0,), (0,), np.array([50.0]), 0.0), measure, Model())
+    r = refit(evidence, (0,), np.array([50.0]), measure, Model())
     assert r.at_bound
     assert r.values[0] == 0.0
 
@@ -96,18 +98,23 @@ def test_a_value_stops_at_its_bound():
 def test_a_change_of_what_the_model_has_already():
     h = one("payload_mass")
     base = Model((term("payload_mass", delta_mass=100.0),))
-    evidence, fit, measure = prepared([h], term("payload_mass", delta_mass=250.0), model=base)
-    assert fit.theta[0] == pytest.approx(150.0, abs=25.0)
-    r = refit(evidence, fit, measure, base)
+    evidence, start, measure = prepared([h], term("payload_mass", delta_mass=250.0), model=base)
+    assert start[0] == pytest.approx(150.0, abs=25.0)
+    r = refitted(evidence, start, measure, base)
     assert abs(r.values[0] - 250.0) < 3.0 * float(np.sqrt(r.covariance[0, 0]))
     assert len(r.model.terms) == 1
 
 
 def test_the_metric_is_that_of_the_tolerant_inner_products():
     asked = [one("payload_mass"), one("aero_drag"), one("tyre_radius", "fl")]
-    evidence, _, _ = prepared(asked, term("payload_mass", delta_mass=250.0))
-    noises = noises_after(evidence, evidence.residuals, {})
-    y = whitened_residual(evidence, noises, evidence.residuals)[None]
-    whole = tolerant(evidence, gram_of(evidence, noises, evidence.residuals))
-    assert float(metric(evidence, noises).inner(y, y)[0, 0]) == pytest.approx(whole[-1, -1], rel=1e-8)
-    assert float(metric(evidence, noises, share=KNOWN).inner(y, y)[0, 0]) > whole[-1, -1]
+    evidence, _, measure = prepared(asked, term("payload_mass", delta_mass=250.0))
+    arena = arena_of(evidence, ())
+    y = measure.rows([r[None] for r in evidence.residuals])
+    whole = arena.tolerant(arena.inner(measure.weighings))
+    assert float(metric(arena, measure.weighings).inner(y, y)[0, 0]) == pytest.approx(whole[-1, -1], rel=1e-5)
+    assert float(measure.inner(y, y)[0, 0]) > whole[-1, -1]
+    half = metric(arena, measure.weighings, coarse=0.5)
+    y = half.rows([r[None] for r in evidence.residuals])
+    assert float(half.inner(y, y)[0, 0]) == pytest.approx(
+        arena.tolerant(0.5 * arena.inner(measure.weighings))[-1, -1], rel=1e-5
+    )

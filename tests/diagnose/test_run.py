@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from aqualog.core.errors import SignalError
-from aqualog.diagnose import arena, run
+from aqualog.diagnose import arena, run, search
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
@@ -123,7 +123,7 @@ def function_of_speed():
 
 
 def test_an_unknown_form_is_the_verdict_and_in_the_model(monkeypatch):
-    monkeypatch.setattr(run, "unknown_forms", lambda *_, **__: (function_of_speed(),))
+    monkeypatch.setattr(search, "unknown_forms", lambda *_, **__: (function_of_speed(),))
     d = told()
     assert d.verdict == "unexplained"
     assert d.causes == ()
@@ -133,7 +133,7 @@ def test_an_unknown_form_is_the_verdict_and_in_the_model(monkeypatch):
 
 
 def test_effects_that_are_certain_stand_beside_an_unknown_form(monkeypatch):
-    monkeypatch.setattr(run, "unknown_forms", lambda *_, **__: (function_of_speed(),))
+    monkeypatch.setattr(search, "unknown_forms", lambda *_, **__: (function_of_speed(),))
     d = told(term("payload_mass", delta_mass=250.0))
     assert d.verdict == "unexplained"
     assert keys(d) == {"payload_mass"}
