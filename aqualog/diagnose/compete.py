@@ -72,50 +72,33 @@ def fitted(arena: Arena, tolerant: FloatArray, members: Sequence[int]) -> Fitted
 def compete(arena: Arena) -> Posterior:
     """The posterior over the sets that a search with swaps visits.
 
-    The noise is that under which the measurement is most likely: after no block, after the best set so far, or after
-    one of the first candidates beside it in the metrics of coloured and of white noise. Else a slow effect would count
-    as noise and could not be found.
+    The noise is that under which the measurement is most likely: after no block, after one of the first candidates in
+    the metrics of coloured and of white noise, or after the best set so far. Else a slow effect would count as noise
+    and could not be found. The noise is sought with the whole likelihood, the posterior has a share of it.
     """
     weighings = arena.weighed([p.residual for p in arena.parts])
-    white = arena.tolerant(COARSE * arena.white())
-    sets: dict[Members, float] = {(): 0.0}
-    best: Members = ()
     least = _surprise(weighings)
-    gram, tolerant = _inner(arena, weighings)
-    tried: set[Members] = set()
-    for k in range(ROUNDS + 1):
-        quieter = _quieter(arena, best, (tolerant, white), least, tried)
-        if quieter is not None:
-            least, weighings = quieter
-            gram, tolerant = _inner(arena, weighings)
-        elif k > 0:
-            break
-        sets = _searched(arena, gram, tolerant)
-        best = max(sets, key=lambda m: sets[m])
-    return _posterior(arena, sets, gram, tolerant, weighings)
-
-
-def _inner(arena: Arena, weighings: Sequence[Weighing]) -> tuple[FloatArray, FloatArray]:
     gram = arena.inner(weighings)
-    return gram, arena.tolerant(COARSE * gram)
-
-
-def _quieter(
-    arena: Arena, best: Members, metrics: Sequence[FloatArray], least: float, tried: set[Members]
-) -> tuple[float, tuple[Weighing, ...]] | None:
-    """Noise after the best set, or after one block more, under which the measurement is clearly more likely."""
-    found = None
-    for metric in metrics:
-        for members in (best, *(tuple(sorted((*best, m))) for m in _first(arena, metric, best))):
-            # the best set again: under a better noise it has better values
-            if not members or (members in tried and members != best):
-                continue
-            tried.add(members)
-            again = arena.weighed(_left(arena, metric, members))
-            size = sum(len(arena.blocks[m].columns) for m in members)
-            if _surprise(again) + OPTIMISM * size < least - CLEARLY:
-                least, found = _surprise(again) + OPTIMISM * size, again
-    return None if found is None else (least, found)
+    first = weighings
+    for metric in (arena.tolerant(gram), arena.tolerant(arena.white())):
+        for m in _first(arena, metric):
+            again = arena.weighed(_left(arena, metric, (m,)))
+            price = OPTIMISM * len(arena.blocks[m].columns)
+            if _surprise(again) + price < least:
+                least, weighings = _surprise(again) + price, again
+    if weighings is not first:
+        gram = arena.inner(weighings)
+    for _ in range(ROUNDS):
+        tolerant = arena.tolerant(gram)
+        sets = _searched(arena, gram, tolerant)
+        best = max(sets, key=lambda k: sets[k])
+        again = arena.weighed(_left(arena, tolerant, best)) if best else weighings
+        if _surprise(again) >= _surprise(weighings) - CLEARLY:
+            break
+        weighings = again
+        gram = arena.inner(weighings)
+    tolerant = arena.tolerant(COARSE * gram)
+    return _posterior(arena, _searched(arena, gram, tolerant), gram, tolerant, weighings)
 
 
 def _posterior(
@@ -139,15 +122,11 @@ def _surprise(weighings: Sequence[Weighing]) -> float:
     return sum(w.surprise for w in weighings)
 
 
-def _first(arena: Arena, metric: FloatArray, beside: Members) -> list[int]:
-    """The few blocks that gain most beside a set."""
+def _first(arena: Arena, metric: FloatArray) -> list[int]:
+    """The few blocks that gain most alone."""
     state = start(metric)
-    for m in beside:
-        state = added(state, m, arena.blocks[m])
     gains = [
-        (scored(state, b)[0] + b.log_prior, i)
-        for i, b in enumerate(arena.blocks)
-        if i not in beside and _shows(arena, state, b, metric)
+        (scored(state, b)[0] + b.log_prior, i) for i, b in enumerate(arena.blocks) if _shows(arena, state, b, metric)
     ]
     return [i for gain, i in sorted(gains, reverse=True)[:FEW] if gain > 0.0]
 
