@@ -78,6 +78,10 @@ class Arena:
             return self.evidence.asked[b.tag].effect.name
         return f"{self.shapes[b.tag].mechanism.name}()"
 
+    def is_along(self, block: Block) -> bool:
+        """Whether a block is a function of time or place."""
+        return block.kind != "effect" and self.shapes[block.tag].along
+
     def drawn(self, part: int, block: Block) -> FloatArray:
         """Scaled columns (k, C, n) of a block along a part."""
         p, c = self.parts[part], list(block.columns)

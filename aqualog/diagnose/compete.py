@@ -77,28 +77,49 @@ def compete(arena: Arena) -> Posterior:
     and could not be found. The noise is sought with the whole likelihood, the posterior has a share of it.
     """
     weighings = arena.weighed([p.residual for p in arena.parts])
-    least = _surprise(weighings)
+    white = arena.tolerant(arena.white())
     gram = arena.inner(weighings)
-    first = weighings
-    for metric in (arena.tolerant(gram), arena.tolerant(arena.white())):
-        for m in _first(arena, metric):
-            again = arena.weighed(_left(arena, metric, (m,)))
-            price = OPTIMISM * len(arena.blocks[m].columns)
-            if _surprise(again) + price < least:
-                least, weighings = _surprise(again) + price, again
-    if weighings is not first:
-        gram = arena.inner(weighings)
+    best: Members = ()
+    least = _surprise(weighings)
     for _ in range(ROUNDS):
         tolerant = arena.tolerant(gram)
+        quieter = _quieter(arena, best, (tolerant, white), least)
+        if quieter is not None:
+            least, weighings = quieter
+            gram = arena.inner(weighings)
+            tolerant = arena.tolerant(gram)
         sets = _searched(arena, gram, tolerant)
-        best = max(sets, key=lambda k: sets[k])
-        again = arena.weighed(_left(arena, tolerant, best)) if best else weighings
-        if _surprise(again) >= _surprise(weighings) - CLEARLY:
+        now = max(sets, key=lambda k: sets[k])
+        again = arena.weighed(_left(arena, tolerant, now)) if now else weighings
+        is_better = _surprise(again) < _surprise(weighings) - CLEARLY
+        if is_better:
+            weighings = again
+            least = _surprise(again) + _price(arena, now)
+            gram = arena.inner(weighings)
+        if now == best or not (is_better or quieter):
             break
-        weighings = again
-        gram = arena.inner(weighings)
+        best = now
     tolerant = arena.tolerant(COARSE * gram)
     return _posterior(arena, _searched(arena, gram, tolerant), gram, tolerant, weighings)
+
+
+def _quieter(
+    arena: Arena, best: Members, metrics: Sequence[FloatArray], least: float
+) -> tuple[float, tuple[Weighing, ...]] | None:
+    """Noise after one block more than the best set, under which the measurement is clearly more likely."""
+    found = None
+    for metric in metrics:
+        for m in _first(arena, metric, best):
+            members = (*best, m)
+            again = arena.weighed(_left(arena, metric, members))
+            score = _surprise(again) + _price(arena, members)
+            if score < least - CLEARLY:
+                least, found = score, again
+    return None if found is None else (least, found)
+
+
+def _price(arena: Arena, members: Members) -> float:
+    return OPTIMISM * sum(len(arena.blocks[m].columns) for m in members)
 
 
 def _posterior(
@@ -122,11 +143,15 @@ def _surprise(weighings: Sequence[Weighing]) -> float:
     return sum(w.surprise for w in weighings)
 
 
-def _first(arena: Arena, metric: FloatArray) -> list[int]:
-    """The few blocks that gain most alone."""
+def _first(arena: Arena, metric: FloatArray, beside: Members) -> list[int]:
+    """The few blocks that gain most beside a set, without functions of time and place: those could be slow noise."""
     state = start(metric)
+    for m in beside:
+        state = added(state, m, arena.blocks[m])
     gains = [
-        (scored(state, b)[0] + b.log_prior, i) for i, b in enumerate(arena.blocks) if _shows(arena, state, b, metric)
+        (scored(state, b)[0] + b.log_prior, i)
+        for i, b in enumerate(arena.blocks)
+        if i not in beside and _shows(arena, state, b, metric) and not arena.is_along(b)
     ]
     return [i for gain, i in sorted(gains, reverse=True)[:FEW] if gain > 0.0]
 

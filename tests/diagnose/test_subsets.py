@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from aqualog.core.vehicle import Vehicle
+from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.any_effect import gains_of
 from aqualog.diagnose.arena import arena_of
 from aqualog.diagnose.compete import compete, fitted
@@ -15,6 +15,7 @@ from aqualog.diagnose.subsets import compatible
 from aqualog.model.effects import EFFECTS
 
 CHANNELS = ("axle_slip", "lateral")
+KNOWN_CAR = Vehicle(given=frozenset(KEYS))  # its file sets every key
 
 
 def hypothesis(name, where=None):
@@ -41,7 +42,7 @@ def bench_of(residual, signatures, asked=ASKED, mask=None):
     mask = np.ones(residual.shape[1], dtype=bool) if mask is None else mask
     own = {"v_x": np.full(mask.size, 20.0)}
     drive = SimpleNamespace(
-        mask=mask, channels=CHANNELS[: len(residual)], vehicle=Vehicle(), coordinates=own, dt=0.1, name="d",
+        mask=mask, channels=CHANNELS[: len(residual)], vehicle=KNOWN_CAR, coordinates=own, dt=0.1, name="d",
         used_s=0.1 * mask.sum(),
     )  # fmt: skip
     values = {(i, h.free[0]): h.parameter(h.free[0]).neutral for i, h in enumerate(asked)}

@@ -24,7 +24,7 @@ from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model
 from tests.blind.world.cases import Hidden, Spec, make_case
-from tests.diagnose.test_subsets import hypothesis
+from tests.diagnose.test_subsets import KNOWN_CAR, hypothesis
 
 MASS, N, DT = 1600.0, 2400, 0.01
 ASKED = tuple(hypothesis(n) for n in ("aero_drag", "payload_mass", "rolling_resistance"))
@@ -61,7 +61,7 @@ def arena(seed, force=None, **effects):
     mask = np.ones(N, dtype=bool)
     mask[700:800] = False
     drive = SimpleNamespace(
-        mask=mask, channels=("force_balance",), vehicle=Vehicle(), coordinates=own, dt=DT, used_s=0.1 * mask.sum()
+        mask=mask, channels=("force_balance",), vehicle=KNOWN_CAR, coordinates=own, dt=DT, used_s=0.1 * mask.sum()
     )
     values = {(i, h.free[0]): h.parameter(h.free[0]).neutral for i, h in enumerate(ASKED)}
     signatures = [[made[h.effect.name][None, None] for h in ASKED]]
