@@ -98,10 +98,11 @@ def diagnose(
     for d in ready:
         defect = accelerometer_defect(d)
         if defect is not None:
-            return _not_testable(ready, model, _words(d, defect, dict(drives)[d.name]), notes)
+            return _not_testable(ready, model, _words(d, defect, dict(drives)[d.name]), notes, vehicle)
     used = sum(d.used_s for d in ready)
     if used < LEAST_USED_S:
-        return _not_testable(ready, model, f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed", notes)
+        reason = f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed"
+        return _not_testable(ready, model, reason, notes, vehicle)
     if model.terms:
         ready = [led_by(d, model) for d in ready]
     asked, untested = hypotheses(ready, model)
@@ -291,11 +292,13 @@ def _words(drive: Drive, defect: Follow, signals: Signals) -> str:
     )
 
 
-def _not_testable(drives: Sequence[Drive], model: Model, reason: str, notes: tuple[str, ...]) -> Diagnosis:
+def _not_testable(
+    drives: Sequence[Drive], model: Model, reason: str, notes: tuple[str, ...], vehicle: Vehicle
+) -> Diagnosis:
     return Diagnosis(
         "not_testable", verdict_sentence("not_testable", (), level=0.0, reason=reason), tuple(d.name for d in drives),
         sum(d.duration_s for d in drives), sum(d.used_s for d in drives), (), (), None, (), (), (), None, None, model,
-        drives[0].channels, {}, notes,
+        drives[0].channels, {}, notes, caution=not_calibrated(vehicle),
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from aqualog.diagnose.records import ResidualView
 from aqualog.report.diagnosis.figures import plots
 from aqualog.report.diagnosis.views import view_data
 from aqualog.report.diagnosis.words import (
+    by_change,
     by_sharpness,
     chance,
     channel_title,
@@ -41,7 +42,9 @@ def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] 
     """
     d, said = document, sentences(document)
     figures = plots(d)
-    causes = [x for c in d["causes"] for x in c["explains"]]
+    most = [name for name, _ in by_change(d)]
+    explained = {x for c in d["causes"] for x in c["explains"]}
+    causes = sorted(explained, key=lambda x: (most.index(x) if x in most else len(most), x))
     answers = [
         ("Test", said["test"]),
         ("Gain", said["score"]),
