@@ -95,13 +95,7 @@ def diagnose(
     tell("preparing", 0.0)
     ready, notes = _prepared(drives, vehicle)
     notes += tuple(f"Known: {term_words(t)}." for t in model.terms[len(given.terms) :])
-    for d in ready:
-        defect = accelerometer_defect(d)
-        if defect is not None:
-            return _not_testable(ready, model, _words(d, defect, dict(drives)[d.name]), notes, vehicle)
-    used = sum(d.used_s for d in ready)
-    if used < LEAST_USED_S:
-        reason = f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed"
+    if reason := _unusable(ready, drives):
         return _not_testable(ready, model, reason, notes, vehicle)
     if model.terms:
         ready = [led_by(d, model) for d in ready]
@@ -139,7 +133,7 @@ def diagnose(
         sentence=_sentence(outcome, found, options),
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
-        used_s=used,
+        used_s=sum(d.used_s for d in ready),
         causes=outcome.causes,
         alternatives=outcome.alternatives,
         significance=found.significance,
@@ -281,6 +275,16 @@ def _prepared(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle) -> tuple[
     if not out:
         raise SignalError("no drive can be used", hint="; ".join(notes[:3]))
     return out, tuple(notes)
+
+
+def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> str:
+    """Why the drives cannot be tested; empty if they can."""
+    for d in ready:
+        defect = accelerometer_defect(d)
+        if defect is not None:
+            return _words(d, defect, dict(drives)[d.name])
+    used = sum(d.used_s for d in ready)
+    return f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed" if used < LEAST_USED_S else ""
 
 
 def _words(drive: Drive, defect: Follow, signals: Signals) -> str:
