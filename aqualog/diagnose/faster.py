@@ -52,7 +52,7 @@ def faster(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, model: Model
     seed : int
         Of the permutations that calibrate the search for seams.
     """
-    found = pooled([per_turn(wheel_columns(s), s.dt, vehicle, s.origins) for _, s in drives])
+    found = pooled([per_turn(wheel_columns(s), s.dt, s.origins) for _, s in drives])
     found = without_known(found, _known(model))
     causes = to_causes(found)
     notes = [f"Not named (probability {c.probability:.2f}): {c.sentence}" for c in causes if c.probability < SURE]
@@ -177,7 +177,7 @@ def why_untested(found: Sequence[PerTurn]) -> str:
 def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
     """Sentences about what is found and is no cause."""
     smallest = EFFECTS["tone_ring"].parameters[0].smallest
-    out = []
+    out, small = [], []
     for f in found:
         if not f.found or (f.most if f.kind == "speed" else f.amplitude) < SHOWN:
             continue
@@ -188,7 +188,9 @@ def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
         elif f.order > 1:
             out.append(f"{what} at all speeds: the tyre or the pick-up, not an eccentric ring.")
         elif f.amplitude < smallest:
-            out.append(f"Significant, but too small to be worth naming: {what[0].lower()}{what[1:]}.")
+            small.append(f"{f.amplitude:.2%}{place(f.wheel)}")
+    if small:
+        out.append(f"Wheel speeds vary once per turn, too little to be worth naming: by {', '.join(small)}.")
     if to_causes(found):
         out.append("A tyre or rim that runs out of true, by its share of the radius, looks like an uneven tone ring.")
     return tuple(out)

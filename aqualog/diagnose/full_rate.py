@@ -18,14 +18,12 @@ from aqualog.core.intervals import chi2_log_p
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Origin, Signals
 from aqualog.core.units import is_unit, parse_unit
-from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.inputs import SPEED_S, smooth
 
 __all__ = ["LEVEL", "ORDERS", "PerTurn", "Z", "per_turn", "wheel_columns"]
 
 ORDERS = (1, 2, 3)
 LEVEL = 0.01  # false alarms per drive, over all wheels and orders
-POWER_Z = 1.2816  # [sd] for a power of 0.9
 Z = 1.959964  # 97.5 % quantile of the normal distribution
 LEAST_HZ = 2.0  # slower, the driver and the springs move the car: the mean over a second ends there
 NYQUIST = 0.8  # share of the highest frequency that a rate can show
@@ -48,11 +46,9 @@ Kind = Literal["ring", "speed", "nothing", "untested"]
 class PerTurn:
     """What one wheel's speed has of one order: `amplitude` relative to the speed, with its 95 % interval.
 
-    `p_value`: of so much by chance anywhere in the drive, over all wheels and orders. `limit`: smallest amplitude that
-    is found with a power of 0.9. `speed` [m/s]: lowest and highest that were used; `used_s` [s]. `turns_gain`: turns
-    by the log's wheel speed over real turns, where a control unit's own radius has made speeds of them; else 1.
-    `kind`: `ring` if the relative amplitude is the same at low and high speed, `speed` if not, with the largest of the
-    thirds by speed as `most`; `untested` with the `reason`.
+    `p_value`: of so much by chance anywhere in the drive, over all wheels and orders. `kind`: `ring` if the relative
+    amplitude is the same at low and high speed, `speed` if not, with the largest of the thirds by speed as `most`;
+    `untested` with the `reason`.
     """
 
     wheel: str
@@ -62,10 +58,6 @@ class PerTurn:
     low: float = math.nan
     high: float = math.nan
     p_value: float = 1.0
-    limit: float = math.nan
-    speed: tuple[float, float] = (math.nan, math.nan)
-    used_s: float = 0.0
-    turns_gain: float = math.nan
     reason: str = ""
     most: float = math.nan
 
@@ -110,7 +102,6 @@ class _Fit(NamedTuple):
     log_p: float
     square: float  # of the amplitude
     sd: float  # of the square
-    noise: float
     tries: int
     sums: _Sum
     at: int
@@ -122,13 +113,8 @@ def wheel_columns(signals: Signals) -> dict[str, FloatArray]:
 
 
 def per_turn(
-    columns: Mapping[str, FloatArray],
-    dt: float,
-    vehicle: Vehicle,
-    origins: Mapping[str, Origin],
-    *,
-    window_s: float | None = None,
-) -> tuple[PerTurn, ...]:
+    columns: Mapping[str, FloatArray], dt: float, origins: Mapping[str, Origin]
+) -> tuple[PerTurn, ...]:  # fmt: skip
     """What repeats with every turn of each wheel, and with every half and third of a turn.
 
     Parameters
@@ -137,13 +123,8 @@ def per_turn(
         `omega_*` [rad/s], not averaged; NaN where a sample is missing.
     dt : float
         [s]
-    vehicle : Vehicle
-        Its radii turn wheel speeds into the speeds of the answer.
     origins : mapping of Origin
         Rate of each signal on its bus, and its unit.
-    window_s : float, optional
-        Time over which the control unit averages a wheel speed. None: unknown, between nothing and the period of its
-        reports; the interval covers both. [s]
 
     Returns
     -------
@@ -151,36 +132,30 @@ def per_turn(
         One for each wheel in the log and each order.
 
     The angle is the integral of the wheel speed itself, so delays do not matter. Its noise makes the angle drift: sums
-    over the whole drive and over 512, 64 and 16 turns compete. Limits: a tyre that runs out of true looks like a ring;
-    a speed that is rounded without noise hides what is smaller than half a step.
+    over the whole drive and over 512, 64 and 16 turns compete. A control unit averages over nothing up to the period of
+    its reports: the interval covers both. Limits: a tyre that runs out of true looks like a ring; a speed that is
+    rounded without noise hides what is smaller than half a step.
     """
-    wheels = [w for w in WHEELS if f"omega_{w}" in columns]
-    raw = [_of_order(columns[f"omega_{w}"], dt, origins.get(f"omega_{w}"), window_s) for w in wheels]
-    tests = sum(not isinstance(r, str) for of in raw for r in of)
-    out = []
-    for w, of in zip(wheels, raw, strict=True):
-        for order, r in zip(ORDERS, of, strict=True):
-            if isinstance(r, str):
-                out.append(PerTurn(w, order, "untested", reason=r))
-                continue
-            p = min(1.0, r.p_value * tests)
-            kind: Kind = r.kind if p <= LEVEL else "nothing"
-            low, high = (x * vehicle.r_e(w) for x in r.speed)
-            reason = r.reason if kind == "speed" else ""
-            out.append(replace(
-                r, wheel=w, order=order, kind=kind, p_value=p, speed=(low, high), reason=reason,
-                limit=r.limit * _stricter(tests),
-            ))  # fmt: skip
-    return tuple(out)
+    found = []
+    for w in WHEELS:
+        origin = origins.get(f"omega_{w}")
+        if f"omega_{w}" not in columns:
+            continue
+        wheel = _prepared(columns[f"omega_{w}"], dt, origin)
+        # a speed has the angle of a radius that nobody knows
+        has_speed = origin is not None and is_unit(origin.unit) and parse_unit(origin.unit).dimension == "speed"
+        for order in ORDERS:
+            r = wheel if isinstance(wheel, str) else _tested(wheel, order, ORDER_SLACK if has_speed else 0.0)
+            found.append(PerTurn(w, order, "untested", reason=r) if isinstance(r, str) else replace(r, wheel=w))
+    tests = sum(r.kind != "untested" for r in found)
+    return tuple(_at_level(r, tests) for r in found)
 
 
-def _of_order(x: FloatArray, dt: float, origin: Origin | None, window_s: float | None) -> list[PerTurn | str]:
-    """Each order of one wheel, with speeds in rad/s and p-values of its own; or why it is not tested."""
-    wheel = _prepared(x, dt, origin)
-    if isinstance(wheel, str):
-        return [wheel] * len(ORDERS)
-    has_speed = origin is not None and is_unit(origin.unit) and parse_unit(origin.unit).dimension == "speed"
-    return [_tested(wheel, order, window_s, ORDER_SLACK if has_speed else 0.0) for order in ORDERS]
+def _at_level(r: PerTurn, tests: int) -> PerTurn:
+    if r.kind == "untested":
+        return r
+    p = min(1.0, r.p_value * tests)
+    return replace(r, p_value=p) if p <= LEVEL else replace(r, p_value=p, kind="nothing", reason="")
 
 
 def _prepared(x: FloatArray, dt: float, origin: Origin | None) -> _Wheel | str:
@@ -214,7 +189,7 @@ def _prepared(x: FloatArray, dt: float, origin: Origin | None) -> _Wheel | str:
     return _Wheel(dt, rate, lines, mean, (filled - mean) / safe, weight, turns, rounding / variance)
 
 
-def _tested(wheel: _Wheel, order: int, window_s: float | None, slack: float) -> PerTurn | str:
+def _tested(wheel: _Wheel, order: int, slack: float) -> PerTurn | str:
     f = order * wheel.mean / (2.0 * math.pi)
     used = (wheel.weight > 0.0) & (f > LEAST_HZ) & (f < 0.5 * NYQUIST * wheel.rate)
     if not used.any():
@@ -224,28 +199,20 @@ def _tested(wheel: _Wheel, order: int, window_s: float | None, slack: float) -> 
     part = _Wheel(wheel.dt, wheel.rate, wheel.lines, *(a[used] for a in wheel[3:]))
     f = f[used]
     # share of the amplitude that is left: no window or the whole period of the reports, and what the mean took
-    period = max(1.0 / wheel.rate, wheel.dt)
-    fixed = (1.0 - _hann_gain(f, wheel.dt)) * np.sinc(f * wheel.lines) ** 2
-    least = fixed * np.sinc(f * (period if window_s is None else window_s))
-    most = fixed if window_s is None else least
+    most = (1.0 - _hann_gain(f, wheel.dt)) * np.sinc(f * wheel.lines) ** 2
+    least = most * np.sinc(f * max(1.0 / wheel.rate, wheel.dt))
     gain = 0.5 * (least + most)
     best = _best(part, order, gain, slack)
     if isinstance(best, str):
         return best
-    sums = best.sums
-    total = float(sums.weight.sum())
     w = part.weight * gain
     by_most, by_least = (float(w @ g) / float(w @ gain) for g in (most, least))
     low = math.sqrt(max(best.square - Z * best.sd, 0.0)) / by_most
     high = math.sqrt(max(best.square + Z * best.sd, 0.0)) / by_least
-    log_p = best.log_p - math.log10(best.tries)
-    needed = math.sqrt(2.0 * math.log(best.tries / LEVEL)) + POWER_Z
     unlike = _speed_dependence(part, order, gain, best)
     return PerTurn(
         "", order, "speed" if unlike[0] else "ring", math.sqrt(max(best.square, 0.0)), low, high,
-        min(1.0, 10.0**-log_p), needed * math.sqrt(2.0 * best.noise / total),
-        (float(part.mean.min()), float(part.mean.max())), float(used.sum() * wheel.dt),
-        order / (order + float(sums.offset[best.at])), *unlike,
+        min(1.0, best.tries * 10.0**-best.log_p), *unlike,
     )  # fmt: skip
 
 
@@ -327,7 +294,7 @@ def _fitted(sums: _Sum, slack: float) -> _Fit | None:
     total = float(sums.weight.sum())
     square = 4.0 / total * (float(power[best]) - count * noise)
     sd = 4.0 / total * math.sqrt(wider * (count * noise**2 + 0.5 * noise * total * max(square, 0.0)))
-    return _Fit(log_p, square, sd, noise * wider, max(1, at.size // 2), sums, best)
+    return _Fit(log_p, square, sd, max(1, at.size // 2), sums, best)
 
 
 def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) -> tuple[str, float]:
@@ -340,16 +307,16 @@ def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) ->
     thirds = [by_speed[(share > a) & (share <= b + 1e-12)] for a, b in ((0.0, 1 / 3), (1 / 3, 2 / 3), (2 / 3, 1.0))]
     if min(t.size for t in thirds) < 2:
         return "", math.nan
-    squares, sds, speeds = [], [], []
-    for third in thirds:
-        weight = sums.weight[third]
-        power = (np.abs(sums.transform[third]) ** 2 / weight[:, None]).sum(axis=0)
-        null = power[(np.abs(sums.offset) >= GUARD + ORDER_SLACK) & (np.abs(sums.offset) <= NULL + ORDER_SLACK)]
-        noise, total = max(float(null.mean()) / third.size, sums.rounding), float(weight.sum())
-        squares.append(max(4.0 / total * (float(power[at]) - third.size * noise), 0.0))
-        sds.append(4.0 / total * math.sqrt(third.size * noise**2 + 0.5 * noise * total * squares[-1]))
-        speeds.append(float(weight @ sums.speed[third]) / total)
-    square, sd = np.array(squares), np.array(sds)
+    parts = [
+        sums._replace(weight=sums.weight[i], transform=sums.transform[i], offset=sums.offset - sums.offset[at])
+        for i in thirds
+    ]
+    fits = [f for f in (_fitted(p, 0.0) for p in parts) if f is not None]
+    if len(fits) < len(parts):
+        return "", math.nan
+    square, sd = (np.array([getattr(f, n) for f in fits]) for n in ("square", "sd"))
+    square = np.maximum(square, 0.0)
+    speeds = [float(sums.weight[i] @ sums.speed[i] / sums.weight[i].sum()) for i in thirds]
     middle = float((square / sd**2).sum() / (1.0 / sd**2).sum())
     log_p = chi2_log_p(float((((square - middle) / sd) ** 2).sum()), 2)
     low, high = int(np.argmin(square)), int(np.argmax(square))
@@ -361,12 +328,6 @@ def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) ->
         f"{math.sqrt(square[low]):.2%} at {speeds[low] / (2.0 * math.pi):.1f}"
     )
     return reason, math.sqrt(square[high])
-
-
-def _stricter(tests: int) -> float:
-    """How much larger the limit is when so many tests share the level."""
-    one = math.sqrt(-2.0 * math.log(LEVEL)) + POWER_Z
-    return (math.sqrt(-2.0 * math.log(LEVEL / max(tests, 1))) + POWER_Z) / one
 
 
 def _held(x: FloatArray) -> int:

@@ -95,13 +95,8 @@ def diagnose(
     tell("preparing", 0.0)
     ready, notes = _prepared(drives, vehicle)
     notes += tuple(f"Known: {term_words(t)}." for t in model.terms[len(given.terms) :])
-    for d in ready:
-        defect = accelerometer_defect(d)
-        if defect is not None:
-            return _not_testable(ready, model, _words(d, defect, dict(drives)[d.name]), notes)
-    used = sum(d.used_s for d in ready)
-    if used < LEAST_USED_S:
-        return _not_testable(ready, model, f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed", notes)
+    if reason := _unusable(ready, drives):
+        return _not_testable(ready, model, reason, notes, vehicle)
     if model.terms:
         ready = [led_by(d, model) for d in ready]
     road = find_profile(ready[0], residual(ready[0], model)) if len(ready) == 1 else None
@@ -146,7 +141,7 @@ def diagnose(
         sentence=_sentence(outcome, found, options),
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
-        used_s=used,
+        used_s=sum(d.used_s for d in ready),
         causes=outcome.causes,
         alternatives=outcome.alternatives,
         significance=found.significance,
@@ -288,6 +283,16 @@ def _prepared(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle) -> tuple[
     return out, tuple(notes)
 
 
+def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> str:
+    """Why the drives cannot be tested; empty if they can."""
+    for d in ready:
+        defect = accelerometer_defect(d)
+        if defect is not None:
+            return _words(d, defect, dict(drives)[d.name])
+    used = sum(d.used_s for d in ready)
+    return f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed" if used < LEAST_USED_S else ""
+
+
 def _words(drive: Drive, defect: Follow, signals: Signals) -> str:
     origin = signals.origins.get("a_x")
     channel = origin.channel if origin is not None else "a_x"
@@ -297,11 +302,13 @@ def _words(drive: Drive, defect: Follow, signals: Signals) -> str:
     )
 
 
-def _not_testable(drives: Sequence[Drive], model: Model, reason: str, notes: tuple[str, ...]) -> Diagnosis:
+def _not_testable(
+    drives: Sequence[Drive], model: Model, reason: str, notes: tuple[str, ...], vehicle: Vehicle
+) -> Diagnosis:
     return Diagnosis(
         "not_testable", verdict_sentence("not_testable", (), level=0.0, reason=reason), tuple(d.name for d in drives),
         sum(d.duration_s for d in drives), sum(d.used_s for d in drives), (), (), None, (), (), (), None, None, model,
-        drives[0].channels, {}, notes,
+        drives[0].channels, {}, notes, caution=not_calibrated(vehicle),
     )  # fmt: skip
 
 

@@ -1,6 +1,5 @@
 """What repeats per turn of a wheel: found at the log's rate, with its size, and nothing where nothing is."""
 
-import math
 import time
 from pathlib import Path
 
@@ -52,8 +51,8 @@ def origins(rate=100.0, unit="rad/s"):
     return {f"omega_{w}": Origin(f"omega_{w}", w, "log", unit, rate, 1) for w in WHEELS}
 
 
-def found(columns, dt=0.01, *, of=None, **how):
-    results = per_turn(columns, dt, CAR, of or origins(1.0 / dt), **how)
+def found(columns, dt=0.01, *, of=None):
+    results = per_turn(columns, dt, of or origins(1.0 / dt))
     return {(r.wheel, r.order): r for r in results}
 
 
@@ -70,9 +69,6 @@ def test_an_uneven_wheel_is_found_with_its_size(wheel, order, amplitude):
     one = results[wheel, order]
     assert one.low <= amplitude <= one.high
     assert one.high - one.low < 0.2 * amplitude + 2e-4
-    assert one.limit < 3e-4
-    assert one.turns_gain == pytest.approx(1.0, abs=1e-9)
-    assert 2.0 * math.pi * 0.317 * 2.0 / order < one.speed[0] * 1.01
 
 
 def test_every_wheel_and_order_has_an_answer():
@@ -104,14 +100,9 @@ def test_the_reports_mean_over_their_period():
     uneven = {"fl": ring(2e-3, 3)}
     how = {"low": 10.0, "high": 12.0, "sigma": 0.01}
     columns = drive(uneven=uneven, dt=0.02, window=0.02, **how)
-    known = found(columns, 0.02, window_s=0.02)["fl", 3]
-    assert known.low <= 2e-3 <= known.high
-    assert known.high - known.low < 1.5e-4
-    wrong = found(columns, 0.02, window_s=0.0)["fl", 3]
-    assert wrong.high < 1.9e-3
     unknown = found(columns, 0.02)["fl", 3]
-    assert unknown.low < wrong.high
-    assert unknown.high >= known.amplitude
+    assert unknown.low < 1.9e-3
+    assert 2e-3 <= unknown.high < 2.2e-3
 
 
 def test_a_slow_bus_shows_only_slow_wheels():
@@ -120,7 +111,6 @@ def test_a_slow_bus_shows_only_slow_wheels():
     assert "10 Hz" in slow["fl", 1].reason
     assert why_untested(tuple(slow.values())) == slow["fl", 1].reason
     mixed = found(drive(uneven={"fl": ring(4e-3)}, dt=0.1, low=4.0, high=10.0), 0.1)["fl", 1]
-    assert mixed.speed[1] < 0.4 * 10.0 * 2.0 * math.pi * 0.317
     assert mixed.low <= 4e-3 <= mixed.high
 
 
@@ -128,27 +118,24 @@ def test_straight_lines_between_samples_of_a_slow_bus():
     columns = drive(uneven={"rl": ring(2e-3)}, dt=0.04, low=8.0, high=18.0)
     t = np.arange(round(200.0 / 0.01)) * 0.01
     fast = {n: np.interp(t, np.arange(x.size) * 0.04, x) for n, x in columns.items()}
-    results = found(fast, of=origins(25.0), window_s=0.0)
+    results = found(fast, of=origins(25.0))
     assert keys(results) == {("rl", 1)}
     assert results["rl", 1].low <= 2e-3 <= results["rl", 1].high
-    assert results["rl", 1].speed[1] < 0.4 * 25.0 * 2.0 * math.pi * 0.317
 
 
 def test_held_samples_of_a_slow_bus():
     columns = {n: np.repeat(x, 4) for n, x in drive(uneven={"rl": ring(2e-3)}, dt=0.04, low=8.0, high=18.0).items()}
-    results = found(columns, window_s=0.0)
+    results = found(columns)
     assert keys(results) == {("rl", 1)}
     assert results["rl", 1].low <= 2e-3 <= results["rl", 1].high
-    assert results["rl", 1].speed[1] < 0.4 * 25.0 * 2.0 * math.pi * 0.317
 
 
 def test_a_control_units_own_radius():
     """A speed in km/h has the angle of a radius that the vehicle file does not know."""
     columns = {n: 1.013 * x for n, x in drive(uneven={"fl": ring(1e-3)}).items()}
-    assert found(columns, window_s=0.0)["fl", 1].high < 1e-3  # the angle runs away within 16 turns
+    assert found(columns)["fl", 1].high < 1e-3  # the angle runs away within 16 turns
     results = found(columns, of=origins(unit="km/h"))
     assert keys(results) == {("fl", 1)}
-    assert results["fl", 1].turns_gain == pytest.approx(1.013, abs=1e-3)
     assert results["fl", 1].low <= 1e-3 <= results["fl", 1].high
 
 
@@ -164,7 +151,7 @@ def test_an_angle_that_drifts_takes_nothing_of_the_size():
 
 def test_noise_alone_leaves_a_sum_to_take_the_size_from():
     """Squares are free of bias, so noise makes negative ones."""
-    fits = [_Fit(0.0, square, 1e-9, 1.0, 1, None, 0) for square in (-3e-6, -1e-6, -2e-6)]
+    fits = [_Fit(0.0, square, 1e-9, 1, None, 0) for square in (-3e-6, -1e-6, -2e-6)]
     assert _lossless(fits) is fits[1]
     assert _lossless([fits[0], fits[2]]) is fits[2]
 
@@ -179,7 +166,6 @@ def test_gaps():
     results = found(columns)
     assert keys(results) == {("fr", 1)}
     assert results["fr", 1].low <= 1e-3 <= results["fr", 1].high
-    assert results["fr", 1].used_s < 190.0
 
 
 def test_a_resonance_is_no_ring():
@@ -213,13 +199,14 @@ def test_what_is_too_small_is_not_listed():
     assert remarks(small) == ()
     first = remarks([PerTurn("fl", 1, "ring", 9e-4, 8e-4, 1e-3, 1e-9)])
     assert len(first) == 1
-    assert first[0].startswith("Significant, but too small to be worth naming")
+    assert first[0] == ("Wheel speeds vary once per turn, too little to be worth naming: by 0.09% (front left wheel).")
+    assert len(remarks([PerTurn(w, 1, "ring", 9e-4, 8e-4, 1e-3, 1e-9) for w in WHEELS])) == 1
 
 
 def test_a_second_order_is_no_tone_ring():
-    results = tuple(found(drive(uneven={"fl": ring(2e-3, 2)}), window_s=0.0).values())
+    results = tuple(found(drive(uneven={"fl": ring(2e-3, 2)})).values())
     assert to_causes(results) == ()
-    assert "(front left wheel) varies twice per turn by 0.20%" in remarks(results)[0]
+    assert "(front left wheel) varies twice per turn by 0.2" in remarks(results)[0]
 
 
 def test_causes_by_wheel_axle_and_side():
@@ -236,7 +223,7 @@ def test_causes_by_wheel_axle_and_side():
     assert [c.where for c in to_causes([answer("fl", 3e-3), answer("rl", 3e-3)])] == ["left"]
     assert {c.where for c in to_causes([answer("fl", 3e-3), answer("fr", 2.5e-3)])} == {"fl", "fr"}
     assert to_causes([answer("fl", 1e-3)]) == ()
-    assert "too small to be worth naming" in remarks([answer("fl", 1e-3)])[0]
+    assert "too little to be worth naming" in remarks([answer("fl", 1e-3)])[0]
     assert "runs out of true" in remarks([answer("fl", 3e-3)])[-1]
 
 
@@ -253,7 +240,7 @@ def test_in_another_simulator(hidden, noise):
     inside = (Hidden("tone_ring", hidden, {"amplitude": 0.003}),) if hidden else ()
     case = make_case(Spec("mixed", noise, inside, 7, holdout=0, duration_s=120.0))
     signals = case.drives[0][1]
-    results = per_turn(wheel_columns(signals), signals.dt, case.vehicle, signals.origins)
+    results = per_turn(wheel_columns(signals), signals.dt, signals.origins)
     assert [c.where for c in to_causes(results)] == ([hidden] if hidden else [])
     assert {(r.wheel, r.order) for r in results if r.found} == ({("fl", 1), ("fr", 1)} if hidden else set())
     for r in results:
@@ -269,8 +256,7 @@ def test_four_measured_wheels_agree_on_their_turn(real_logs):
         [folder / "can_bus.mf4"], vehicle=car, signal_map=load_signal_map(here / "toyota_map.toml"),
         dbc=[folder / "toyota_2017.dbc"],
     )  # fmt: skip
-    results = per_turn(wheel_columns(signals), signals.dt, car, signals.origins)
+    results = per_turn(wheel_columns(signals), signals.dt, signals.origins)
     seen = [r for r in results if r.found]
     assert {r.wheel for r in seen if r.order == 1} == set(WHEELS)
-    assert all(r.turns_gain == pytest.approx(1.0114, abs=2e-3) for r in seen)
     assert all(5e-4 < r.amplitude < 1.5e-3 for r in seen if r.order == 1)

@@ -140,10 +140,12 @@ def test_effects_that_are_certain_stand_beside_an_unknown_form(monkeypatch):
     assert {t.effect.name for t in d.model.terms} == {"payload_mass", "unexplained_force"}
 
 
-def test_too_little_driving_is_not_testable():
+def test_too_little_driving_is_not_testable(monkeypatch):
+    monkeypatch.setattr(run, "not_calibrated", lambda _: "Mass is a guess.")
     d = told(log=noisy(speed=((0.0, 15.0), (12.0, 15.0), (22.0, 1.0)), duration_s=40.0))
     assert d.verdict == "not_testable"
     assert "s of usable driving, 20 s are needed" in d.sentence
+    assert d.caution == "Mass is a guess."
 
 
 def test_a_frozen_accelerometer_is_not_testable():

@@ -10,6 +10,7 @@ from aqualog.diagnose.records import ResidualView
 from aqualog.report.diagnosis.figures import plots
 from aqualog.report.diagnosis.views import view_data
 from aqualog.report.diagnosis.words import (
+    by_change,
     by_sharpness,
     chance,
     channel_title,
@@ -41,11 +42,14 @@ def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] 
     """
     d, said = document, sentences(document)
     figures = plots(d)
-    causes = [x for c in d["causes"] for x in c["explains"]]
+    most = [name for name, _ in by_change(d)]
+    explained = {x for c in d["causes"] for x in c["explains"]}
+    explained = explained or {r["channel"] for r in d["unexplained"]}
+    causes = sorted(explained, key=lambda x: (most.index(x) if x in most else len(most), x))
     answers = [
         ("Test", said["test"]),
         ("Gain", said["score"]),
-        ("Next", said["manoeuvre"]),
+        ("Next", said["manoeuvre"] if d["verdict"] != "cannot_tell" else []),  # there it has a section
     ]
     head = Headline(said["headline"][0], [(k, x[0]) for k, x in answers if x], verdict_title(d["verdict"]))
     level = percent(d["criteria"]["interval"])
@@ -53,17 +57,20 @@ def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] 
         Lines(said["manoeuvre"]),
         Para(f"Distinguishes: {'; '.join(_separates(d))}" if _separates(d) else ""),
     ], "next", look="next")  # fmt: skip
+    residuals = Section(
+        "Measured minus simulated, before and after", [Residuals()] if views else [], "views-section",
+        "dots: samples; line: median; band: middle 68 % of a bin", where="page",
+    )  # fmt: skip
+    unknown = Section("Not explained", [
+        Lines(said["unexplained"]), Figures([x for x in figures if x.startswith("remainder-")]),
+    ], "unexplained-section")  # fmt: skip
     sections = [
         Section("", [Lines(said["caution"])], "caution", look="problems"),
         Section("", [head], "verdict", look=f"verdict {_LOOKS.get(d['verdict'], 'open')}"),
         *([settle] if d["verdict"] == "cannot_tell" else []),
         *_on_causes(d, said, level),
         *([] if d["verdict"] == "cannot_tell" else [settle]),
-        Section("Measured minus simulated, before and after", [Residuals()] if views else [], "views-section",
-                "dots: samples; line: median; band: middle 68 % of a bin", where="page"),
-        Section("Not explained", [
-            Lines(said["unexplained"]), Figures([x for x in figures if x.startswith("remainder-")]),
-        ], "unexplained-section"),
+        *((residuals, unknown) if d["verdict"] != "unexplained" else (unknown, residuals)),
         *_on_gain(said, figures),
         *_on_limits(d),
         *_on_isolability(d, said, figures),

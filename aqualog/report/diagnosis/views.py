@@ -40,8 +40,8 @@ def view_data(views: Sequence[ResidualView], explained: Sequence[str] = ()) -> d
     ----------
     views : sequence of ResidualView
     explained : sequence of str
-        Channels whose error the causes reduce. The page opens with the coordinate that matters most to the first of
-        them.
+        Channels whose error the causes reduce, the most reduced first. The page opens with that panel, over the
+        coordinate that matters most to it.
 
     Returns
     -------
@@ -56,8 +56,9 @@ def view_data(views: Sequence[ResidualView], explained: Sequence[str] = ()) -> d
     known: dict[tuple[str, int, bytes], int] = {}
     most = min(MOST_POINTS, max(100, MOST_PLOTTED // max(1, len(views))))
     shown = []
-    # panels of explained channels first; sorting keeps the order of the others
-    for v in sorted(views, key=lambda v: v.channel not in explained):
+    order = {c: i for i, c in enumerate(explained)}
+    # sorting keeps the order of the channels that no cause explains
+    for v in sorted(views, key=lambda v: order.get(v.channel, len(order))):
         step = max(1, -(-v.before.size // most))
         key = (v.drive, v.before.size, b"".join(x[::step].tobytes() for x in v.coordinates.values()))
         if key not in known:

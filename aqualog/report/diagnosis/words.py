@@ -177,8 +177,10 @@ def _alternative(a: Mapping[str, Any]) -> str:
     )
     ratio = a["evidence_ratio"]
     how = f", {short(ratio)} times less likely" if ratio is not None else ""
-    chances = ", ".join(filter(None, (chance(c.get("probability")) for c in a["causes"])))
-    return f"{names}{f': {values}' if values else ''}{how}{f', probability {chances}' if chances else ''}"
+    # a set is no more probable than the least probable of its causes
+    known = [c["probability"] for c in a["causes"] if c.get("probability") is not None]
+    least = f", probability {'at most ' if len(a['causes']) > 1 else ''}{chance(min(known))}" if known else ""
+    return f"{names}{f': {values}' if values else ''}{how}{least}"
 
 
 def _agreement(a: Mapping[str, Any]) -> str:

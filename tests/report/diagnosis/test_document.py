@@ -331,6 +331,9 @@ def test_causes_and_alternatives_bear_their_probabilities():
     text = text_of(d)
     assert "97 %" in text.split("payload mass", 1)[1]
     assert sentences(d)["alternatives"][0].endswith("probability 2 %")
+    both = replace(other, causes=(replace(RADIUS, probability=0.021), replace(MASS, probability=0.58)))
+    two = sentences(document_of(alternatives=(both,)))["alternatives"][0]
+    assert two.endswith("probability at most 2 %")  # no set is more probable than its least probable cause
 
 
 def test_a_file_that_is_not_calibrated_comes_first():

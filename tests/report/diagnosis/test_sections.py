@@ -95,6 +95,9 @@ def test_views_are_thinned_and_shared():
 def test_explained_channels_come_first():
     data = view_data(views_of("named"), ["slip_rr"])
     assert [v["title"] for v in data["views"][:3]] == ["Slip RR [–]", "Slip RR [–]", "Force balance [m/s²]"]
+    both = view_data(views_of("named"), ["slip_rr", "force_balance"])["views"]
+    assert [v["title"][:7] for v in both[:4]] == ["Slip RR", "Slip RR", "Force b", "Force b"]
+    assert view_data(views_of("named"), ["force_balance", "slip_rr"])["views"][0]["title"] == "Force balance [m/s²]"
 
 
 def test_speed_is_in_kmh_and_a_coordinate_without_change_has_no_bins():
