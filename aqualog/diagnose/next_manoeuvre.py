@@ -157,9 +157,7 @@ def _percent(p: float) -> str:
     return "over 99 %" if p > 0.99 else f"{100.0 * p:.0f} %"
 
 
-def _apart(
-    members: Sequence[Sequence[Hypothesis]], pair: tuple[int, int]
-) -> tuple[list[Hypothesis], list[Hypothesis]]:
+def _apart(members: Sequence[Sequence[Hypothesis]], pair: tuple[int, int]) -> tuple[list[Hypothesis], list[Hypothesis]]:
     """Members of each set of a pair that the other set does not hold."""
     a, b = members[pair[0]], members[pair[1]]
     return [h for h in a if h not in b], [h for h in b if h not in a]

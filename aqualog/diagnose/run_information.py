@@ -58,9 +58,7 @@ class Case:
     def near(self) -> Case:
         """The same with the tolerances of the effects in question and of every vehicle file only."""
         names = self.effects
-        return replace(
-            self, tolerances=tuple(x for x in self.tolerances if x[1].allowed or x[1].effect.name in names)
-        )
+        return replace(self, tolerances=tuple(x for x in self.tolerances if x[1].allowed or x[1].effect.name in names))
 
     @property
     def columns(self) -> list[list[int]]:
