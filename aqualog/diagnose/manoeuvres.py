@@ -39,7 +39,7 @@ WET_STEP, WET_LEAST, WET_MOST = 20.0 * KMH, 30.0 * KMH, 90.0 * KMH  # [m/s]
 class Run:
     """A run of one minute. `speed` (t [s], v [km/h]) that the driver keeps to; `minutes` with the way there and back.
 
-    `how` completes "Drive ...". `rolls` from this time on without drive or brakes [s]. `water`: how it differs from the
+    `how`: an order. `rolls` from this time on without drive or brakes [s]. `water`: how it differs from the
     log's speed on water: -1 slower, 1 faster, 0 dry at that speed; None: dry, with the given `speed`.
     """
 
@@ -73,23 +73,23 @@ def _saw(low: float, high: float, up: float, down: float) -> Profile:
 
 _SAME = "on the same road, in the same direction and soon"
 RUNS: tuple[Run, ...] = (
-    Run("hard_acceleration", f"from 40 to 110 km/h at 3 m/s² and back, repeatedly, {_SAME}", 2.0,
+    Run("hard_acceleration", f"Accelerate from 40 to 110 km/h at 3 m/s² and slow down, repeatedly, {_SAME}", 2.0,
         _saw(40.0, 110.0, 3.0, 1.5)),
-    Run("coast_down", f"up to 120 km/h and let the car roll without drive and brakes, {_SAME}", 2.0,
+    Run("coast_down", f"Coast down from 120 km/h in neutral, without brakes, {_SAME}", 2.0,
         ((0.0, 100.0), (8.0, 120.0), (10.0, 120.0)), rolls=10.0),
-    Run("speed_steps", f"at 40, 60, 80, 100 and 120 km/h for ten seconds each, {_SAME}", 2.0,
+    Run("speed_steps", f"Drive at 40, 60, 80, 100 and 120 km/h for ten seconds each, {_SAME}", 2.0,
         ((0.0, 40.0), (10.0, 40.0), (14.0, 60.0), (22.0, 60.0), (26.0, 80.0), (34.0, 80.0), (38.0, 100.0),
          (46.0, 100.0), (50.0, 120.0), (60.0, 120.0))),
-    Run("brake_steps", f"at 100 km/h and brake to 40 km/h at 1.5, 2.5 and 3.5 m/s², {_SAME}", 2.0,
+    Run("brake_steps", f"Drive at 100 km/h and brake to 40 km/h at 1.5, 2.5 and 3.5 m/s², {_SAME}", 2.0,
         ((0.0, 100.0), (4.0, 100.0), (15.1, 40.0), (25.0, 100.0), (31.7, 40.0), (42.0, 100.0), (46.8, 40.0),
          (60.0, 100.0))),
-    Run("slalom", f"at 60 km/h and swing gently from side to side within the lane, {_SAME}", 2.0,
+    Run("slalom", f"Drive at 60 km/h and swing gently from side to side within the lane, {_SAME}", 2.0,
         ((0.0, 60.0), (60.0, 60.0)), steering=Steering(0.02, 4.0, 3.0)),
-    Run("opposite_direction", "the same road in the opposite direction, at 60 to 110 km/h, while the wind is the same",
+    Run("opposite_direction", "Drive the same road in the opposite direction, at 60 to 110 km/h, in the same wind",
         6.0, _saw(60.0, 110.0, 1.0, 0.7), opposite=True),
-    Run("second_pass_dry", "the same road at the same speed when it is dry", 2.0, water=0),
-    Run("wet_pass_slower", "through the same water 20 km/h slower", 2.0, water=-1),
-    Run("wet_pass_faster", "through the same water 20 km/h faster, at most at 90 km/h", 2.0, water=1),
+    Run("second_pass_dry", "Drive the same road at the same speed when it is dry", 2.0, water=0),
+    Run("wet_pass_slower", "Drive through the same water 20 km/h slower", 2.0, water=-1),
+    Run("wet_pass_faster", "Drive through the same water 20 km/h faster, at most at 90 km/h", 2.0, water=1),
 )  # fmt: skip
 
 SENSORS: tuple[Sensor, ...] = (
@@ -106,11 +106,16 @@ def checks(effects: frozenset[str]) -> tuple[Check, ...]:
     return tuple(sorted((c for c in rows if c is not None), key=lambda c: (c.minutes, c.name)))
 
 
-def fitting(effects: frozenset[str], *, wet: bool) -> tuple[Run, ...]:
-    """Runs that make sense for these effects: water only for effects of water, the way back where it changes a sign."""
+def fitting(effects: frozenset[str], drive: Drive) -> tuple[Run, ...]:
+    """Runs that make sense for these effects and signals: water only for effects of water, the way back where it
+    changes a sign, bends only where the log shows the steering."""
     rows = [EFFECTS[name] for name in effects if name in EFFECTS]
-    on_water, turning = wet and any(e.of_water for e in rows), any(e.drive.turns for e in rows)
-    return tuple(r for r in RUNS if (r.water is None or on_water) and (not r.opposite or turning))
+    on_water, turning = bool(drive.course.lanes) and any(e.of_water for e in rows), any(e.drive.turns for e in rows)
+    bends = "steer_angle" in drive.present
+    return tuple(
+        r for r in RUNS
+        if (r.water is None or on_water) and (not r.opposite or turning) and (r.steering is None or bends)
+    )  # fmt: skip
 
 
 def programme(run: Run, drive: Drive) -> Scenario:

@@ -160,7 +160,8 @@ class Remainder:
 class Manoeuvre:
     """A run that would distinguish the remaining causes, or the answer that no run of the catalogue does.
 
-    `name`: of the catalogue, `none`, or `sensor`; `separation_now`, `separation_then`: lambda of the worst pair.
+    `name`: of the catalogue, `none`, or `sensor`; `separation_now`, `separation_then`: lambda of the worst pair,
+    NaN where `before` and `after` have the probability of naming the right cause.
     """
 
     name: str
@@ -169,6 +170,8 @@ class Manoeuvre:
     separation_now: float
     separation_then: float
     minutes: float
+    before: float = float("nan")
+    after: float = float("nan")
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,29 +1,33 @@
-"""Simulated trial of a run or check: separation of the sets of effects, weighted by the noise of the log."""
+"""What a run or check would tell about the sets that remain: its data as each set predicts them, after the log."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
+from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.drive import Drive, prepare
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in
-from aqualog.diagnose.isolate import separation
 from aqualog.diagnose.manoeuvres import Run, Sensor, programme, turned
 from aqualog.diagnose.noise import Noise, bridged, for_mask, spectra, whitened
 from aqualog.diagnose.outcome import Rival
+from aqualog.diagnose.refit import PRIOR_WIDTH
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Check, Model
 
-__all__ = ["Case", "of_check", "of_log", "of_run"]
+__all__ = ["Case", "Forecast", "entropy", "forecast", "of_check", "of_log", "of_run"]
 
-STEP_S = 2e-3  # [s] of the integration
+STEP_S = 5e-3  # [s] of the integration
+DRAWS = 300  # of the run's data, for each set
+SEED = 1
 # rms noise of channels that the log does not have yet, independent from second to second (K)
 _ASSUMED = {"force_balance": 0.1, "kinematic": 0.15, "lateral": 0.2, "tie_rod": 100.0}
 _ASSUMED_SPEED = 0.05  # [m/s] of all others
@@ -31,14 +35,13 @@ _ASSUMED_SPEED = 0.05  # [m/s] of all others
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """The decision to make: the sets, their pairs, and all tolerances as (hypothesis, parameter, its sd)."""
+    """The decision to make: the sets with their probabilities, and tolerances as (hypothesis, parameter, its sd)."""
 
     evidence: Evidence
-    credible: tuple[Rival, ...]
+    rivals: tuple[Rival, ...]
     noises: tuple[Noise, ...]
     model: Model
-    pairs: tuple[tuple[int, int], ...]
-    forgiven: tuple[tuple[Hypothesis, str, float], ...]
+    tolerances: tuple[tuple[int, Hypothesis, str, float], ...]  # the first is the column of the evidence
     like: int  # the drive whose signals, noise and water a run is assumed to have
 
     @property
@@ -49,108 +52,131 @@ class Case:
     @property
     def effects(self) -> frozenset[str]:
         """Names of all effects in question."""
-        return frozenset(h.effect.name for c in self.credible for h in c.refit.members)
+        return frozenset(h.effect.name for c in self.rivals for h in c.refit.members)
 
     @property
-    def near(self) -> tuple[int, ...]:
-        """Tolerances of the effects in question, and those of every vehicle file."""
+    def near(self) -> Case:
+        """The same with the tolerances of the effects in question and of every vehicle file only."""
         names = self.effects
-        return tuple(i for i, (h, _, _) in enumerate(self.forgiven) if h.allowed or h.effect.name in names)
+        return replace(self, tolerances=tuple(x for x in self.tolerances if x[1].allowed or x[1].effect.name in names))
 
-    def rows(self, kept: Sequence[int]) -> list[int]:
-        """Rows of the sets, of the simulation's error in a run, and of a part of the tolerances."""
-        first = len(self.credible) + sum(len(c.refit.values) for c in self.credible) + 1
-        return [*range(first), *(first + i for i in kept)]
-
-    def apart(self, gram: FloatArray, kept: Sequence[int]) -> FloatArray:
-        """Separation of each pair by inner products of rows with a part of the tolerances; the smaller of two ways."""
-        k = len(gram) - len(kept) + np.arange(len(kept))
-        inner = gram[np.ix_(k, k)] + np.diag([self.forgiven[i][2] ** -2.0 for i in kept])
-        gram = gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :])
-        own, at = [], len(self.credible)
-        for c in self.credible:
-            own.append(tuple(range(at, at + len(c.refit.values))))
-            at += len(c.refit.values)
-        ways = [
-            [
-                _certain(gram, (a, b, at), own[b])
-                for a, b in ((i, j), (j, i))
-                # a set that holds the truth and more can always imitate it
-                if any(h not in self.credible[b].refit.members for h in self.credible[a].refit.members)
-            ]
-            for i, j in self.pairs
-        ]
-        return np.array([min(w) for w in ways])
+    @property
+    def columns(self) -> list[list[int]]:
+        """Rows of each set's own parameters and of the tolerances, behind the remainders of all sets."""
+        out, at = [], len(self.rivals)
+        total = at + sum(len(c.refit.names) for c in self.rivals)
+        for c in self.rivals:
+            k = len(c.refit.names)
+            out.append([*range(at, at + k), *range(total, total + len(self.tolerances))])
+            at += k
+        return out
 
 
-def _certain(gram: FloatArray, rows: tuple[int, int, int], rivals: Sequence[int]) -> float:
-    """Separation of a truth from its rivals, reduced by the possible influence of the simulation's own error `rows[2]`.
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """`information` [nat] that a run is expected to give; `right`: probability that the likeliest cause is the true
+    one; `pairs` (S, S): the same between two sets."""
 
-    The difference d of two sets is disturbed by noise and the error e: twice the log of the ratio of evidence has mean
-    d^2 - 2 |e d| and variance 4 d^2. The result is the separation that is equally certain without an error.
-    """
-    plain = separation(gram, rows, rivals, np.array([-1.0, 1.0, 0.0]))
-    if plain <= 0.0:
-        return 0.0
-    cross = 0.25 * (
-        separation(gram, rows, rivals, np.array([-1.0, 1.0, 1.0]))
-        - separation(gram, rows, rivals, np.array([-1.0, 1.0, -1.0]))
-    )
-    return max(plain - 2.0 * abs(cross), 0.0) ** 2 / plain
+    information: float
+    right: float
+    pairs: FloatArray
+
+
+def entropy(p: FloatArray) -> FloatArray:
+    """Missing information of probabilities (..., S). [nat]"""
+    return np.asarray(-(p * np.log(np.maximum(p, 1e-300))).sum(axis=-1))
 
 
 def of_log(case: Case) -> FloatArray:
-    """Inner products of the remainders of the log after each set, its columns, and all tolerances."""
-    evidence = case.evidence
-    forgiven = np.flatnonzero(evidence.forgiven > 0.0).tolist()
+    """Inner products of the remainders of the log after each set, the sets' columns, and the tolerances."""
     total: FloatArray | float = 0.0
-    for d, (drive, noise) in enumerate(zip(evidence.drives, case.noises, strict=True)):
-        parts = [c.refit.residuals[d][None] for c in case.credible] + [c.refit.signatures[d] for c in case.credible]
+    for d, (drive, noise) in enumerate(zip(case.evidence.drives, case.noises, strict=True)):
+        parts = [c.refit.residuals[d][None] for c in case.rivals] + [c.refit.signatures[d] for c in case.rivals]
         rows = whitened(spectra(bridged(np.concatenate(parts), drive.mask)), noise)
-        nothing = np.zeros((1, rows.shape[1]))
-        own = spectra(bridged(evidence.signatures[d][forgiven], drive.mask))
-        rows = np.concatenate([rows, nothing, whitened(own, noise)])
+        kept = spectra(bridged(case.evidence.signatures[d][[x[0] for x in case.tolerances]], drive.mask))
+        rows = np.concatenate([rows, whitened(kept, noise)])
         total = total + rows @ rows.T
     return np.asarray(total)
 
 
-def of_run(case: Case, run: Run, kept: Sequence[int], sensor: Sensor | None = None) -> FloatArray:
-    """Whitened rows of a run, simulated under the best set; empty if no sample of it can be used."""
+def forecast(case: Case, log: FloatArray, run: FloatArray, times: int, group: FloatArray) -> Forecast:
+    """Expected information of a run that is driven so many times.
+
+    Under set i, the parameters and tolerances have a normal posterior after the log, and so have the data of the run.
+    Tolerances belong to the car, so the run shares them with the log. The data are drawn under each set in the space
+    that all rows span, and each set's density gives the posterior.
+
+    Parameters
+    ----------
+    case : Case
+    log, run : array (N, N)
+        Inner products of the rows of `of_log` and `of_run` or `of_check`.
+    times : int
+    group : array (S, S)
+        1 where a set (row) has the effects of a group (column): such sets are one cause.
+    """
+    size, turn = np.linalg.eigh(run * times)
+    seen = size > 1e-9 * max(float(size[-1]), 1e-9)
+    at = turn[:, seen] * np.sqrt(size[seen])  # rows in coordinates of unit noise
+    rng = np.random.default_rng(SEED)
+    unit = rng.standard_normal((DRAWS, at.shape[1]))
+    means, roots = [], []
+    wide = [sd for _, _, _, sd in case.tolerances]
+    for i, (c, own) in enumerate(zip(case.rivals, case.columns, strict=True)):
+        sd = [PRIOR_WIDTH * c.refit.members[m].parameter(n).sigma for m, n in c.refit.names] + wide
+        spread = np.linalg.inv(log[np.ix_(own, own)] + np.diag(np.array(sd) ** -2.0))
+        means.append(at[own].T @ (spread @ log[own, i]) - at[i])
+        roots.append(np.linalg.cholesky(np.eye(at.shape[1]) + at[own].T @ spread @ at[own]))
+    p = np.array([c.probability for c in case.rivals])
+    p = p / p.sum()
+    density = np.empty((len(p), DRAWS, len(p)))
+    for j, (mean, root) in enumerate(zip(means, roots, strict=True)):
+        y = mean + unit @ root.T
+        for i, (other, its) in enumerate(zip(means, roots, strict=True)):
+            z = np.linalg.solve(its, (y - other).T)
+            density[j, :, i] = math.log(p[i] + 1e-300) - np.log(np.diag(its)).sum() - 0.5 * (z * z).sum(axis=0)
+    after = np.exp(density - density.max(axis=2, keepdims=True))
+    after = after / after.sum(axis=2, keepdims=True) @ group
+    right = (after.argmax(axis=2) == group.argmax(axis=1)[:, None]).mean(axis=1)
+    pairs = np.ones((len(p), len(p)))
+    for i, j in combinations(range(len(p)), 2):
+        won = [float((density[a, :, a] > density[a, :, b]).mean()) for a, b in ((i, j), (j, i))]
+        pairs[i, j] = pairs[j, i] = (p[i] * won[0] + p[j] * won[1]) / (p[i] + p[j])
+    gained = float(entropy(p @ group) - p @ entropy(after).mean(axis=1))
+    return Forecast(max(gained, 0.0), max(float(p @ right), float((p @ group).max())), pairs)
+
+
+def of_run(case: Case, run: Run, sensor: Sensor | None = None) -> FloatArray:
+    """Inner products of the rows of a run, simulated under the best set; zero if no sample of it can be used."""
     drive = _driven(case, run, sensor)
-    n_rows = len(case.rows(kept))
+    n = len(case.rivals) + sum(len(c.refit.names) for c in case.rivals) + len(case.tolerances)
     if not drive.mask.any():
-        return np.zeros((n_rows, 1))
-    models = [c.refit.model for c in case.credible]
-    model = case.model
+        return np.zeros((n, n))
+    models, model = [c.refit.model for c in case.rivals], case.model
     if run.opposite:
         models, model = [turned(m) for m in models], turned(model)
     left = [residual(drive, m) for m in models]
     own = [
-        _signatures(drive, m, c.refit.members, r, run, each=True)
-        for m, c, r in zip(models, case.credible, left, strict=True)
-    ]
-    asked: list[Hypothesis] = []
-    for i in kept:
-        if case.forgiven[i][0] not in asked[-1:]:
-            asked.append(case.forgiven[i][0])
+        s for m, c, r in zip(models, case.rivals, left, strict=True)
+        for s in _signatures(drive, m, c.refit.members, r, run, each=True)
+    ]  # fmt: skip
+    asked = list({id(h): h for _, h, _, _ in case.tolerances}.values())
     shown = _signatures(drive, model, asked, residual(drive, model), run, each=False)
-    rows = np.concatenate([np.array(left), *own, left[0][None], shown])
-    return _weighed(case, drive, rows)
+    rows = _weighed(case, drive, np.concatenate([np.array(left), *own, *shown]))
+    return np.asarray(rows @ rows.T)
 
 
 def _signatures(
     drive: Drive, model: Model, asked: Sequence[Hypothesis], base: FloatArray, run: Run, *, each: bool
-) -> FloatArray:
-    """Signatures by the values that the same road has in the log's direction. (k, C, m)"""
+) -> list[FloatArray]:
+    """Signatures (k, C, m) by the values that the same road has in the log's direction."""
     parts = signatures(drive, model, asked, base=base, each=each)
-    if run.opposite:
-        parts = [-s if h.effect.drive.turns else s for h, s in zip(asked, parts, strict=True)]
-    return np.concatenate(parts)
+    return [-s if run.opposite and h.effect.drive.turns else s for h, s in zip(asked, parts, strict=True)]
 
 
 def _driven(case: Case, run: Run, sensor: Sensor | None) -> Drive:
     """A run under the best set, with perfect sensors for the signals that the log has."""
-    truth = case.credible[0].refit.model
+    truth = case.rivals[0].refit.model
     simulation = simulate(programme(run, case.drive), turned(truth) if run.opposite else truth, dt=STEP_S)
     signals = as_signals(simulation, truth=False)
     present = case.drive.present | set(sensor.signals if sensor else ())
@@ -177,14 +203,19 @@ def _weighed(case: Case, drive: Drive, rows: FloatArray) -> FloatArray:
     return out
 
 
-def of_check(case: Case, check: Check, kept: Sequence[int]) -> FloatArray:
-    """One column: the remainder of the reading after each set, and the change by its parameters."""
+def of_check(case: Case, check: Check) -> FloatArray:
+    """Inner products of one reading: the remainder after each set, and the change by its parameters.
 
-    def meant(h: Hypothesis, name: str) -> bool:
-        return h.effect.drive.check is check and h.where in check.where and name == check.parameter
+    A reading at several wheels is their mean, so one wheel counts a quarter.
+    """
 
-    asked = next(h for h in case.evidence.asked if h.effect.drive.check is check and h.where in check.where)
-    left = [-value_in(c.refit.model, asked, check.parameter) for c in case.credible]
-    own = [float(meant(c.refit.members[i], n)) for c in case.credible for i, n in c.refit.names]
-    forgiven = [float(meant(*case.forgiven[i][:2])) for i in kept]
-    return np.array([*left, *own, 0.0, *forgiven])[:, None] / check.sd
+    def share(h: Hypothesis, name: str) -> float:
+        if h.effect.drive.check is not check or h.where not in check.where or name != check.parameter:
+            return 0.0
+        return 0.25 if h.where in WHEELS else 0.5 if h.where in AXLES else 1.0
+
+    sets = [[(h, n, value_in(c.refit.model, h, n)) for h in c.refit.members for n in h.free] for c in case.rivals]
+    left = [-sum(share(h, n) * (x - h.parameter(n).neutral) for h, n, x in own) for own in sets]
+    own = [share(c.refit.members[i], n) for c in case.rivals for i, n in c.refit.names]
+    row = np.array([*left, *own, *(share(h, n) for _, h, n, _ in case.tolerances)]) / check.sd
+    return np.outer(row, row)

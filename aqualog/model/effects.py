@@ -193,6 +193,15 @@ _STANDSTILL = Check(  # level to 0.3 %: twice in opposite directions at one plac
     "readings of the accelerometer is its bias", 5.0, ("a_x", None), "bias", 0.01,
 )  # fmt: skip
 
+_JACKED = Check(
+    "jacked_wheel", "Jack up each wheel and turn it in neutral with a torque wrench", 20.0,
+    (None, "f", "r", "fl", "fr", "rl", "rr"), "torque", 2.0,
+)  # fmt: skip
+_ROLLED = Check(  # 2 cm and the load's share of ten turns, 20 m
+    "rolled_distance", "Roll the car ten turns of each wheel and measure the way", 20.0,
+    (None, "f", "r", "fl", "fr", "rl", "rr"), "delta", 0.002,
+)  # fmt: skip
+
 _ALL = [
     Effect(
         "road_grade", "slope angle of the road [rad]", "The road climbs by {grade:.1%}.",
@@ -253,7 +262,7 @@ _ALL = [
             DayToDay("rolling", _as_brake)),),
         _plus(brake_drag="torque"), _WHEEL_PLACES,
         twins=("rolling_resistance",),
-        drive=DriveSearch((_TORQUE,), by_wheel=True),
+        drive=DriveSearch((_TORQUE,), by_wheel=True, check=_JACKED),
     ),
     Effect(
         "cornering_drag", "resistance in curves [s^2/m]", "Curves cost more than the two-track model says.",
@@ -378,7 +387,7 @@ _ALL = [
         _on_plant(lambda p, v, w: p._replace(
             **{n: _changed(getattr(p, n), w, np.multiply, 1.0 + v["delta"]) for n in ("r_e", "r_l")})),
         _WHEEL_PLACES, twins=("velocity_scale",),
-        drive=DriveSearch((_SPEEDS,), by_wheel=True, axle_key="wheels.r_e_"), belongs="tyre",
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, axle_key="wheels.r_e_", check=_ROLLED), belongs="tyre",
     ),
     Effect(
         "pressure_loss", "radius and slip slope of a tyre that loses its air", "The tyre lost its air.",

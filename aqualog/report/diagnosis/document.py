@@ -79,7 +79,8 @@ def diagnosis_document(
         "isolability_pairs": _pairs(d.confusions),
         "next_manoeuvre": None if m is None else {
             **fields_of(m, "name", "separates", "sentence", "separation_now", "separation_then"),
-            "p_correct_now": _p_correct(m.separation_now), "p_correct_then": _p_correct(m.separation_then),
+            "p_correct_now": _p_correct(m.separation_now) if math.isnan(m.before) else plain(m.before),
+            "p_correct_then": _p_correct(m.separation_then) if math.isnan(m.after) else plain(m.after),
             "minutes": plain(m.minutes),
         },
         "extended_model": extended_model,
