@@ -2,68 +2,37 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
-from aqualog.diagnose.competition import Block, State, added, scored, start, values
+from aqualog.diagnose.competition import Block, State
+from aqualog.diagnose.evidence import Evidence
+from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
 
-__all__ = ["Fitted", "Posterior", "compete", "fitted"]
+__all__ = ["Fitted", "Members", "Posterior", "compete", "fitted", "rule"]
 
-WIDTH = 8  # sets that are carried on
-MOST = 4  # blocks in one set
-SWAPPED = 3  # sets in which every member is exchanged
-FEW = 4  # first candidates in each metric after which the noise is tried
 ROUNDS = 3  # of noise after the best set
-DIES = 6.0  # [nats] behind the best set, at which a level of larger sets ends the search
-SINGULAR = 1e-3  # share of a column's energy that the others of its set must leave
-SMALLEST = 1e-12
 OPTIMISM = 1.5  # [nats] a column by which noise after a fit is too likely
-
-Members = tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Posterior:
-    """`sets` by evidence with their prior, best first, and `probability` of each; `gram` plain and `tolerant`."""
+class Posterior(Sets):
+    """The posterior over sets with its inner products, `gram` plain and `tolerant`."""
 
-    sets: tuple[tuple[Members, float], ...]
-    probability: FloatArray
-    marginal: Mapping[str, float]  # by name of effect or mechanism
-    blocks: Mapping[int, float]  # by block
     gram: FloatArray
     tolerant: FloatArray
     weighings: tuple[Weighing, ...]
 
-    @property
-    def best(self) -> Members:
-        """The most probable set."""
-        return self.sets[0][0]
-
-
-@dataclass(frozen=True, slots=True)
-class Fitted:
-    """A set's `columns`, posterior `mean` (k,) and `covariance` (k, k) in scaled values."""
-
-    columns: list[int]
-    mean: FloatArray
-    covariance: FloatArray
-
 
 def fitted(arena: Arena, tolerant: FloatArray, members: Sequence[int]) -> Fitted:
     """Values of all columns of a set together."""
-    state = start(tolerant)
-    scales = []
-    for m in members:
-        scales.append(scored(state, arena.blocks[m])[1])
-        state = added(state, m, arena.blocks[m])
-    return Fitted(*values(tolerant, [arena.blocks[m] for m in members], scales))
+    return fitted_in(arena.blocks, tolerant, members)
 
 
 def compete(arena: Arena) -> Posterior:
@@ -80,7 +49,7 @@ def compete(arena: Arena) -> Posterior:
     tolerant = arena.tolerant(gram)
     first = weighings
     for metric in (tolerant, arena.tolerant(arena.white())):
-        for m in _first(arena, metric):
+        for m in first_of(arena.blocks, metric):
             again = arena.weighed(_left(arena, metric, (m,)))
             price = OPTIMISM * len(arena.blocks[m].columns)
             if _surprise(again) + price < least:
@@ -89,7 +58,7 @@ def compete(arena: Arena) -> Posterior:
         if weighings is not first:
             gram = arena.inner(weighings)
             tolerant = arena.tolerant(gram)
-        sets = _searched(arena, gram, tolerant)
+        sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram))
         best = max(sets, key=lambda k: sets[k])
         if not best or set(best) == set(after):
             break
@@ -97,37 +66,14 @@ def compete(arena: Arena) -> Posterior:
         if _surprise(again) >= _surprise(weighings) - 1.0:
             break
         weighings, after = again, best
-    return _posterior(arena, sets, gram, tolerant, weighings)
-
-
-def _posterior(
-    arena: Arena, sets: Mapping[Members, float], gram: FloatArray, tolerant: FloatArray, weighings: Sequence[Weighing]
-) -> Posterior:
-    ranked = tuple(sorted(sets.items(), key=lambda x: -x[1]))
-    z = np.array([e for _, e in ranked])
-    p = np.exp(z - z.max())
-    p /= p.sum()
-    by_name: dict[str, float] = {}
-    by_block: dict[int, float] = {}
-    for (members, _), q in zip(ranked, p.tolist(), strict=True):
-        for name in {arena.name(m) for m in members}:
-            by_name[name] = by_name.get(name, 0.0) + q
-        for m in members:
-            by_block[m] = by_block.get(m, 0.0) + q
-    return Posterior(ranked, p, by_name, by_block, gram, tolerant, tuple(weighings))
+    found = ranked(sets, arena.name)
+    return Posterior(
+        found.sets, found.probability, found.marginal, found.blocks, gram, tolerant, tuple(weighings)
+    )  # fmt: skip
 
 
 def _surprise(weighings: Sequence[Weighing]) -> float:
     return sum(w.surprise for w in weighings)
-
-
-def _first(arena: Arena, metric: FloatArray) -> list[int]:
-    """The few blocks that gain most alone."""
-    state = start(metric)
-    gains = [
-        (scored(state, b)[0] + b.log_prior, i) for i, b in enumerate(arena.blocks) if _shows(arena, state, b, metric)
-    ]
-    return [i for gain, i in sorted(gains, reverse=True)[:FEW] if gain > 0.0]
 
 
 def _left(arena: Arena, metric: FloatArray, members: Members) -> list[FloatArray]:
@@ -140,72 +86,25 @@ def _left(arena: Arena, metric: FloatArray, members: Members) -> list[FloatArray
     return out
 
 
-def _searched(arena: Arena, gram: FloatArray, tolerant: FloatArray) -> dict[Members, float]:
-    """Evidence of the sets that are visited: the best ones of each size carried on, then members exchanged."""
-    states = [start(tolerant)]
-    sets: dict[Members, float] = {(): 0.0}
-    for _ in range(MOST):
-        new: dict[Members, tuple[float, State, int]] = {}
-        for state in states:
-            for i, gain in _joining(arena, gram, tolerant, state):
-                key = tuple(sorted((*state.members, i)))
-                total = state.evidence + gain
-                if key not in new or new[key][0] < total:
-                    new[key] = (total, state, i)
-        for key, (total, _, _) in new.items():
-            sets.setdefault(key, total)
-        top = sorted(new.values(), key=lambda x: -x[0])[:WIDTH]
-        if not top or top[0][0] < max(sets.values()) - DIES:
-            break
-        states = [added(state, i, arena.blocks[i]) for _, state, i in top]
-    for members in sorted(sets, key=lambda k: -sets[k])[:SWAPPED]:
-        for out in members if len(members) > 1 else ():
-            state = start(tolerant)
-            for m in members:
-                if m != out:
-                    state = added(state, m, arena.blocks[m])
-            for i, gain in _joining(arena, gram, tolerant, state):
-                key = tuple(sorted((*state.members, i)))
-                sets[key] = max(sets.get(key, -math.inf), state.evidence + gain)
-    return sets
+def rule(evidence: Evidence, blocks: Sequence[Block], gram: FloatArray) -> MayJoin:
+    """Which block may join a set: no effect twice at a wheel, no twin that says nothing of its own."""
+    asked = evidence.asked
 
-
-def _joining(arena: Arena, gram: FloatArray, tolerant: FloatArray, state: State) -> list[tuple[int, float]]:
-    """Blocks that may join a set, with what each gains."""
-    return [
-        (i, scored(state, b)[0] + b.log_prior)
-        for i, b in enumerate(arena.blocks)
-        if i not in state.members and _may_join(arena, gram, state, b) and _shows(arena, state, b, tolerant)
-    ]
-
-
-def _may_join(arena: Arena, gram: FloatArray, state: State, block: Block) -> bool:
-    if block.kind != "effect":
+    def may_join(state: State, block: Block) -> bool:
+        if block.kind != "effect":
+            return True
+        own = asked[block.tag].effect
+        known = [blocks[m] for m in state.members if blocks[m].kind == "effect"]
+        if any(asked[o.tag].effect is own for o in known) and not compatible(
+            evidence, (*(o.tag for o in known), block.tag)
+        ):
+            return False
+        for o in known:
+            other = asked[o.tag].effect
+            if other.name in own.twins or own.name in other.twins:
+                c, e = block.columns[0], o.columns[0]
+                if 1.0 - gram[c, e] ** 2 / max(gram[c, c] * gram[e, e], 1e-30) < TWINS:
+                    return False
         return True
-    asked = arena.evidence.asked
-    own = asked[block.tag].effect
-    known = [arena.blocks[m] for m in state.members if arena.blocks[m].kind == "effect"]
-    if any(asked[o.tag].effect is own for o in known) and not compatible(
-        arena.evidence, (*(o.tag for o in known), block.tag)
-    ):
-        return False
-    for o in known:
-        other = asked[o.tag].effect
-        if other.name in own.twins or own.name in other.twins:
-            c, e = block.columns[0], o.columns[0]
-            if 1.0 - gram[c, e] ** 2 / max(gram[c, c] * gram[e, e], 1e-30) < TWINS:
-                return False
-    return True
 
-
-def _shows(arena: Arena, state: State, block: Block, tolerant: FloatArray) -> bool:
-    """Whether a set leaves enough of a single column, and its value is within its bounds."""
-    if len(block.columns) > 1:
-        return True
-    c, A = block.columns[0], state.inner
-    if A[c, c] < max(SINGULAR * tolerant[c, c], SMALLEST):
-        return False
-    if block.low is None or block.high is None:
-        return True
-    value = A[c, -1] / A[c, c]
-    return bool(block.low[0] <= value <= block.high[0])
+    return may_join

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -18,6 +18,7 @@ from aqualog.diagnose.probability import SURE, tempered
 from aqualog.diagnose.records import Alternative, Cause, Estimate, Verdict
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import Found, Option, sharpened
+from aqualog.diagnose.sets import grouped, shares
 from aqualog.diagnose.words import cause_sentence
 from aqualog.model.term import Model
 
@@ -85,14 +86,9 @@ def conclude(found: Found, model: Model) -> Outcome:
         beside = tuple(c for c in causes if c.probability >= SURE)
         return Outcome("unexplained", beside, certain=frozenset(c.effect for c in beside))
     sets = _sets(found, model)
-    groups: dict[frozenset[str], list[_Set]] = {}
-    for s in sets:
-        groups.setdefault(s.names, []).append(s)
-    ranked = sorted(groups.values(), key=lambda g: -sum(s.share for s in g))
-    marginal: dict[str, float] = {}
-    for s in sets:
-        for n in s.names:
-            marginal[n] = marginal.get(n, 0.0) + s.share
+    together = grouped([s.names for s in sets], [s.share for s in sets])
+    ranked = [[sets[i] for i in g] for g in together.groups]
+    marginal = together.marginal
     if not ranked or not ranked[0][0].names:
         first = ranked[0][0].causes if ranked else ()
         return Outcome("no_effect", (), small=_small([c for c, large in first if not large]))
@@ -127,7 +123,7 @@ def conclude(found: Found, model: Model) -> Outcome:
     )  # fmt: skip
 
 
-def _with_probability(causes: Sequence[Cause], marginal: dict[str, float]) -> tuple[Cause, ...]:
+def _with_probability(causes: Sequence[Cause], marginal: Mapping[str, float]) -> tuple[Cause, ...]:
     return tuple(replace(c, probability=tempered(marginal.get(c.effect, 0.0))) for c in causes)
 
 
@@ -139,9 +135,7 @@ def _sets(found: Found, model: Model) -> list[_Set]:
     """Options with their causes and shares, most likely first."""
     if not found.options:
         return []
-    z = np.array([o.evidence for o in found.options])
-    p = np.exp(z - z.max())
-    p /= p.sum()
+    p = shares([o.evidence for o in found.options])
     out = []
     for o, share in zip(found.options, p.tolist(), strict=True):
         if share < LEAST_SHARE:
