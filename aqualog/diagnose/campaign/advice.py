@@ -9,10 +9,10 @@ import numpy as np
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
+from aqualog.diagnose.campaign.compete import Option
 from aqualog.diagnose.campaign.expect import Driven, Response, respond
 from aqualog.diagnose.campaign.noise import Fit
 from aqualog.diagnose.campaign.passes import CONTACT_MIN, LOST_MAX, RESISTANCE, Passes
-from aqualog.diagnose.campaign.refit import Refit
 from aqualog.diagnose.records import Manoeuvre
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import assemble
@@ -44,18 +44,18 @@ class _Run:
     beside: bool = False
 
 
-def advice(passes: Passes, survivors: Sequence[Refit], scatter: Fit) -> Manoeuvre | None:
-    """Five runs of the catalogue that best distinguish the two most similar causes.
+def advice(passes: Passes, rivals: Sequence[Option], scatter: Fit) -> Manoeuvre | None:
+    """Five runs of the catalogue that best distinguish the two most likely sets.
 
-    None with fewer than two survivors. The answer is `none` where no run does.
+    None with fewer than two. The answer is `none` where no run does.
     """
-    if len(survivors) < 2:
+    if len(rivals) < 2:
         return None
-    first, second = survivors[0], survivors[1]
-    pair = ("+".join(sorted(first.keys)) or "none", "+".join(sorted(second.keys)) or "none")
-    now = max(second.cost - first.cost, 0.0)
+    first, second = rivals[:2]
+    pair = (first.refit.keys, second.refit.keys)
+    now = 2.0 * max(first.evidence - second.evidence, 0.0)
     runs = _catalogue(passes)
-    a, b = (_expected(runs, r.model, passes) for r in (first, second))
+    a, b = (_expected(runs, o.refit.model, passes) for o in (first, second))
     sigma, kappa = scatter.scatter
     channels = [i for i, n in enumerate(passes.names) if not n.startswith("dry_")]
     best, most = None, 0.0
