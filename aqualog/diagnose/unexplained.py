@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -17,9 +17,10 @@ from aqualog.diagnose.competition import Block
 from aqualog.diagnose.probability import SURE, tempered
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.sets import Sets, evidence_of
+from aqualog.diagnose.shapes import Shape
 from aqualog.diagnose.unknown_term import describe
 
-__all__ = ["Clear", "band", "clear_forms", "nearest_to", "unknown_forms"]
+__all__ = ["Clear", "Field", "clear_forms", "described", "unknown_forms"]
 
 AHEAD = 5.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
@@ -28,6 +29,25 @@ LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what it explains, by t
 NOTABLE = 0.05  # probability from which another coordinate is mentioned
 ALIKE = 0.2  # share of the best coordinate's probability from which the drive cannot distinguish another
 DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points together
+
+
+class Field(Protocol):
+    """What competes: blocks, the shapes that some of them are, and the prior size of each column."""
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """Of known effects and of shapes."""
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """Of the blocks' tags."""
+
+    @property
+    def sd(self) -> FloatArray:
+        """By which columns are scaled."""
+
+    def name(self, block: int) -> str:
+        """Name by which probabilities add up."""
 
 
 class Clear(NamedTuple):
@@ -42,13 +62,13 @@ class Clear(NamedTuple):
     loss: float
 
 
-def clear_forms(blocks: Sequence[Block], name: Callable[[int], str], found: Sets, inner: FloatArray) -> list[Clear]:
+def clear_forms(field: Field, found: Sets, inner: FloatArray) -> list[Clear]:
     """Mechanisms of the best set that no known effect replaces, what explains most first.
 
     A mechanism counts if its share of the posterior is 0.95, the best set is e^5 times as likely as every set of known
     effects, and it explains a fifth of what the set explains.
     """
-    best = found.best
+    blocks, name, best = field.blocks, field.name, found.best
     known = max(e for members, e in found.sets if all(blocks[m].kind != "shape" for m in members))
     if found.sets[0][1] - known < AHEAD:
         return []
@@ -70,7 +90,7 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
 
     Beside the conditions of `clear_forms`, a mechanism must explain 5 % of a channel's variance.
     """
-    clear = clear_forms(arena.blocks, arena.name, posterior, posterior.tolerant)
+    clear = clear_forms(arena, posterior, posterior.tolerant)
     if not clear:
         return ()
     fit = fitted(arena, posterior.tolerant, posterior.best)
@@ -78,7 +98,7 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     for c in clear:
         channel, share = _where(arena, c.own, fit)
         if channel is not None:
-            found.append(_described(arena, posterior, c.first, fit, c.probability, channel, share, seed))
+            found.append(described(arena, posterior, posterior.gram, fit, c, channel, share, seed))
     return tuple(found)
 
 
@@ -110,31 +130,32 @@ def _where(arena: Arena, members: Sequence[int], fit: Fitted) -> tuple[str | Non
     return (max(told)[1], max(told)[0]) if told else (None, 0.0)
 
 
-def _described(
-    arena: Arena, posterior: Posterior, m: int, fit: Fitted, probability: float, channel: str, share: float, seed: int
+def described(
+    field: Field, found: Sets, gram: FloatArray, fit: Fitted, clear: Clear, channel: str, share: float, seed: int
 ) -> Remainder:  # fmt: skip
-    block = arena.blocks[m]
-    s = arena.shapes[block.tag]
-    own = _own(arena, m, fit)
-    at = s.basis.at_points * arena.sd[list(block.columns)]
+    """A mechanism of the best set as a function with its band, from a fit of that set."""
+    m, block = clear.first, field.blocks[clear.first]
+    s = field.shapes[block.tag]
+    own = [fit.columns.index(c) for c in block.columns]
+    at = s.basis.at_points * field.sd[list(block.columns)]
     f = at @ fit.mean[own]
-    half = band(at, fit.covariance[np.ix_(own, own)], s.basis.supported, seed)
+    half = _band(at, fit.covariance[np.ix_(own, own)], s.basis.supported, seed)
     f, half = (np.where(s.basis.supported, x, np.nan) for x in (f, half))
     others = {
-        arena.shapes[arena.blocks[o].tag].coordinates: q
-        for o, q in posterior.blocks.items()
-        if o != m and arena.blocks[o].kind == "shape" and arena.name(o) == arena.name(m) and q >= NOTABLE
+        field.shapes[field.blocks[o].tag].coordinates: q
+        for o, q in found.blocks.items()
+        if o != m and field.blocks[o].kind == "shape" and field.name(o) == field.name(m) and q >= NOTABLE
     }
-    alike = sorted({n for c, q in others.items() if q >= ALIKE * posterior.blocks[m] for n in c} - set(s.coordinates))
-    nearest, cosine = nearest_to(arena.blocks, posterior.gram, m, fit.mean[own])
-    found = Remainder(
+    alike = sorted({n for c, q in others.items() if q >= ALIKE * found.blocks[m] for n in c} - set(s.coordinates))
+    nearest, cosine = _nearest(field.blocks, gram, m, fit.mean[own])
+    r = Remainder(
         channel, s.coordinates, share, math.nan, s.basis.points, f, f - half, f + half, tuple(alike), nearest, cosine,
-        "", s.mechanism.name, s.mechanism.unit, probability,
+        "", s.mechanism.name, s.mechanism.unit, clear.probability,
     )  # fmt: skip
-    return replace(found, sentence=describe(s.mechanism, found))
+    return replace(r, sentence=describe(s.mechanism, r))
 
 
-def band(at: FloatArray, covariance: FloatArray, supported: BoolArray, seed: int) -> FloatArray:
+def _band(at: FloatArray, covariance: FloatArray, supported: BoolArray, seed: int) -> FloatArray:
     """Half width of a band that the function leaves nowhere with 95 %. (k,)"""
     sd = np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", at, covariance, at), 1e-30))
     root = np.linalg.cholesky(covariance + 1e-12 * np.trace(covariance) * np.eye(len(covariance)))
@@ -143,7 +164,7 @@ def band(at: FloatArray, covariance: FloatArray, supported: BoolArray, seed: int
     return np.asarray(sd * float(np.quantile(most, LEVEL)))
 
 
-def nearest_to(blocks: Sequence[Block], gram: FloatArray, m: int, mean: FloatArray) -> tuple[str | None, float]:
+def _nearest(blocks: Sequence[Block], gram: FloatArray, m: int, mean: FloatArray) -> tuple[str | None, float]:
     """The known effect whose signature is most alike, with the cosine."""
     c = list(blocks[m].columns)
     energy = float(mean @ gram[np.ix_(c, c)] @ mean)

@@ -1,5 +1,7 @@
 """Sets of blocks: the search visits the right one, shares add up by name, a form needs what no effect explains."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -21,6 +23,9 @@ def block(i, columns, kind="effect"):
 
 
 BLOCKS = [*(block(i, (i,)) for i in range(4)), block(4, (4, 5), "shape")]
+
+
+FIELD = SimpleNamespace(blocks=tuple(BLOCKS), name=lambda m: BLOCKS[m].key)
 
 
 def always(state, other):
@@ -56,7 +61,7 @@ def test_a_form_is_clear_where_no_effect_explains_it():
     def forms(y):
         G = 4.0 * inner(y + 0.5 * RNG.standard_normal(400))
         sets = ranked(searched(BLOCKS, G, always), lambda m: BLOCKS[m].key)
-        return [c.own for c in clear_forms(BLOCKS, lambda m: BLOCKS[m].key, sets, G)], sets, G
+        return [c.own for c in clear_forms(FIELD, sets, G)], sets, G
 
     shaped, sets, G = forms(X @ [0.0, 1.0, 0.0, 0.0, 0.8, 0.8])
     assert shaped == [(4,)]

@@ -12,8 +12,8 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.any_effect import Calibration, calibrate, tested
 from aqualog.diagnose.arena import blocks_of
 from aqualog.diagnose.campaign.catalogue import Library, library
-from aqualog.diagnose.campaign.forms import described, shapes_of
-from aqualog.diagnose.campaign.noise import Fit, inner, whole_fit
+from aqualog.diagnose.campaign.forms import explained, shapes_of
+from aqualog.diagnose.campaign.noise import Fit, fit, inner
 from aqualog.diagnose.campaign.passes import Passes
 from aqualog.diagnose.campaign.refit import Refit, refit
 from aqualog.diagnose.compete import rule
@@ -22,7 +22,7 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.sets import Members, Sets, fitted_in, ranked, searched
 from aqualog.diagnose.shapes import Shape
-from aqualog.diagnose.unexplained import clear_forms
+from aqualog.diagnose.unexplained import clear_forms, described
 from aqualog.model.term import Model
 
 __all__ = ["Found", "Option", "compete"]
@@ -62,11 +62,12 @@ class _Ring:
     given: Model
     asked: tuple[Hypothesis, ...]
     blocks: tuple[Block, ...]
+    sd: FloatArray
     shapes: tuple[Shape, ...]
     functions: FloatArray
 
-    def name(self, m: int) -> str:
-        b = self.blocks[m]
+    def name(self, block: int) -> str:
+        b = self.blocks[block]
         return self.asked[b.tag].effect.name if b.kind == "effect" else f"{self.shapes[b.tag].mechanism.name}()"
 
     @property
@@ -102,10 +103,10 @@ def compete(
     say("signatures of the effects")
     lib = library(passes, given, asked, given)
     shapes, functions = shapes_of(passes)
-    ring = _Ring(passes, given, asked, blocks_of(lib.evidence, shapes)[0], shapes, functions)
+    ring = _Ring(passes, given, asked, *blocks_of(lib.evidence, shapes), shapes, functions)
     y = passes.values - lib.base
     nothing = Refit((), np.zeros(0), given, y, np.zeros((*y.shape, 0)), at_bound=False)
-    stand = _Stand(nothing, lib, y, whole_fit(y, lib.x, lib.road, passes.nuisances))
+    stand = _Stand(nothing, lib, y, fit(y, lib.x, lib.road, passes.nuisances))
     gram = stand.gram(passes)
     plain = gram / np.outer(scale := np.append(lib.evidence.prior, 1.0), scale)
     calibration = calibrate(lib.evidence, plain, surrogates=surrogates, level=level, seed=seed)
@@ -123,8 +124,8 @@ def compete(
 
 
 def _refitted(ring: _Ring, stand: _Stand, members: Members, gram: FloatArray) -> Refit:
-    fit = fitted_in(ring.known, gram, members)
-    return refit(ring.passes, ring.given, [ring.asked[m] for m in members], fit.mean, stand.scatter.weight)
+    linear = fitted_in(ring.known, gram, members)
+    return refit(ring.passes, ring.given, [ring.asked[m] for m in members], linear.mean, stand.scatter.weight)
 
 
 def _repeated(ring: _Ring, stand: _Stand) -> _Stand:
@@ -138,14 +139,14 @@ def _repeated(ring: _Ring, stand: _Stand) -> _Stand:
         found = _refitted(ring, stand, best, gram)
         lib = library(ring.passes, found.model, ring.asked, ring.given)
         own = [c for m in best for c in ring.known[m].columns]
-        scatter = whole_fit(found.residual, lib.x, lib.road, ring.passes.nuisances, stand.scatter.scatter)
+        scatter = fit(found.residual, lib.x, lib.road, ring.passes.nuisances, stand.scatter)
         stand, done = _Stand(found, lib, found.residual + lib.x[:, :, own] @ found.theta, scatter), best
     return stand
 
 
 def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...], _Stand]:
     """Unknown forms that no known effect replaces; the scatter is that with the forms of the best set free too."""
-    passes = ring.passes
+    passes, k = ring.passes, stand.lib.evidence.count
     after: Members = ()
     for _ in range(ROUNDS):
         gram = stand.gram(passes, ring.functions)
@@ -154,19 +155,21 @@ def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...]
         if new == after:
             break
         after = new
-        k = stand.lib.evidence.count
         drawn = [
             ring.functions[:, :, [c - k for c in b.columns]] @ np.linalg.cholesky(b.prior)
             for b in (ring.blocks[m] for m in new)
         ]
         x = np.concatenate([stand.lib.x, *drawn], axis=-1)
-        wider = whole_fit(stand.best.residual, x, stand.lib.road, passes.nuisances, stand.scatter.scatter)
+        wider = fit(stand.best.residual, x, stand.lib.road, passes.nuisances, stand.scatter)
         stand = replace(stand, scatter=wider)
-    x = np.concatenate([stand.lib.x, ring.functions], axis=-1)
-    clear = clear_forms(ring.blocks, ring.name, sets, gram)
-    return tuple(
-        described(passes, ring.shapes, ring.blocks, sets, gram, c, x, stand.y, seed=seed) for c in clear
-    ), stand  # fmt: skip
+    out = []
+    linear = fitted_in(ring.blocks, gram, sets.best)
+    for c in clear_forms(ring, sets, gram):
+        own = [i for m in c.own for i in ring.blocks[m].columns]
+        form = ring.functions[:, :, [i - k for i in own]] @ linear.mean[[linear.columns.index(i) for i in own]]
+        name = ring.shapes[ring.blocks[c.first].tag].mechanism.name
+        out.append(described(ring, sets, gram, linear, c, name, explained(passes, name, stand.y, form), seed))
+    return tuple(out), stand
 
 
 def _options(ring: _Ring, stand: _Stand, nothing: Refit) -> tuple[Option, ...]:

@@ -50,7 +50,7 @@ def _at_place(group: Sequence[Candidate[Option]]) -> Candidate[Option]:
 def _causes(found: Found, chosen: Refit, passes: Passes, given: Model) -> tuple[tuple[Cause, bool], ...]:
     """The members of a set, and whether a value reaches its smallest size and its interval excludes no change."""
     all_values = iter(estimates(chosen, passes, found.scatter.weight))
-    spread = np.sqrt(np.diag(found.scatter.scatter.sigma))
+    spread = np.sqrt(np.diag(found.scatter.sigma))
     out, at = [], 0
     for h in chosen.members:
         values = {n: next(all_values) for n in h.free}

@@ -66,16 +66,6 @@ class Passes:
     left_out: Mapping[str, int]
     question: Question
 
-    def part(self, which: Sequence[int]) -> Passes:
-        """Some of the runs."""
-        at = np.asarray(which, dtype=np.int64)
-        told = tuple(self.told[i] for i in at)
-        return replace(
-            self, values=self.values[at], told=told, question=question_of(told),
-            infos=tuple(self.infos[i] for i in at), coordinates={k: x[at] for k, x in self.coordinates.items()},
-            nuisances=self.nuisances[at], seconds=self.seconds[at],
-        )  # fmt: skip
-
 
 def channels_of(wheels: Sequence[str]) -> tuple[str, ...]:
     """Names of the columns."""
@@ -121,17 +111,21 @@ def doubted(passes: Passes, base: Model) -> Passes:
     return replace(passes, nuisances=np.concatenate([columns, passes.nuisances], axis=-1))
 
 
-def steady(passes: Passes, model: Model) -> list[int]:
-    """Runs in which every wheel keeps enough contact by a model for its steady expectation to hold, by index."""
+def steady(passes: Passes, model: Model) -> Passes:
+    """Runs without values where a wheel keeps too little contact by a model for its steady expectation to hold."""
     q = passes.question
     found = respond([assemble(s, model) for s in q.scenarios], q.which, q.wet, q.driven)
     lost, contact = found.lost.max(axis=0), found.contact.min(axis=0)
-    out = []
-    for r in range(len(passes.told)):
+    floats = np.zeros(len(passes.told), dtype=np.bool_)
+    for r in np.unique(q.run[q.wet]):
         here = (q.run == r) & q.wet
-        if not here.any() or (lost[here].mean() <= LOST_MAX and contact[here].mean() >= CONTACT_MIN):
-            out.append(r)
-    return out
+        floats[r] = lost[here].mean() > LOST_MAX or contact[here].mean() < CONTACT_MIN
+    if not floats.any():
+        return passes
+    return replace(
+        passes, values=np.where(floats[:, None], np.nan, passes.values), seconds=np.where(floats, 0.0, passes.seconds),
+        left_out={**passes.left_out, "a wheel floats in the model that was found": int(floats.sum())},
+    )  # fmt: skip
 
 
 def expected_values(passes: Passes, model: Model, *, friction: float = 1.0) -> tuple[FloatArray, FloatArray]:

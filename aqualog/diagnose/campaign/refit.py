@@ -137,7 +137,7 @@ def estimates(found: Refit, passes: Passes, weight: FloatArray) -> list[Estimate
     both = np.concatenate([passes.nuisances, found.x], axis=-1)
     both = np.where(np.isfinite(found.residual)[:, :, None], both, 0.0)
     wb = weight @ both
-    inverse = inverse_of(np.einsum("rck,rcl->kl", both, wb) + np.diag(np.append(prior_of(free, 0), np.zeros(k))))
+    inverse = inverse_of(np.einsum("rck,rcl->kl", both, wb) + np.diag(np.append(prior_of(free), np.zeros(k))))
     y = np.nan_to_num(found.residual)
     e = y - both @ (inverse @ np.einsum("rck,rc->k", wb, y))
     hat = np.einsum("rck,kl,rdl->rcd", both, inverse, wb)

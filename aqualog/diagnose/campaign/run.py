@@ -21,6 +21,7 @@ from aqualog.diagnose.campaign.outcome import conclude
 from aqualog.diagnose.campaign.passes import RESISTANCE, Passes, doubted, steady
 from aqualog.diagnose.campaign.refit import settled
 from aqualog.diagnose.records import Diagnosis, Gain, ResidualView
+from aqualog.diagnose.unknown_term import short_form
 from aqualog.diagnose.verdict import Decision
 from aqualog.diagnose.words import verdict_sentence
 from aqualog.model.term import Model
@@ -89,9 +90,9 @@ def diagnose_campaign(
     found = found_in(passes)
     if found.options:
         kept = steady(passes, found.options[0].refit.model)
-        if LEAST_RUNS <= len(kept) < len(passes.told):
+        if kept is not passes and np.isfinite(kept.values[:, -1]).sum() >= LEAST_RUNS:
             say("repeating without runs that float in the new model")
-            passes = passes.part(kept)
+            passes = kept
             found = found_in(passes)._replace(significance=found.significance)
     say("gain on runs left out")
     decision = conclude(found, passes, given, seed=seed)
@@ -119,7 +120,7 @@ def _diagnosed(
     sizes = isolate.reference_sizes(
         replace(evidence, smallest=np.zeros(evidence.count)), found.gram, c.inflation, c.threshold
     )  # fmt: skip
-    reason = f": {found.forms[0].sentence.rstrip('.')}" if found.forms else ""
+    reason = f" ({short_form(found.forms[0])})" if found.forms else ""
     sentence = verdict_sentence(
         d.verdict, d.causes, level=level, reason=reason, certain=d.certain,
         seen=p if p <= level else None, source="campaign",
