@@ -18,6 +18,7 @@ from aqualog.diagnose.campaign.passes import Passes
 from aqualog.diagnose.campaign.refit import Refit, refit
 from aqualog.diagnose.compete import rule
 from aqualog.diagnose.competition import Block, added, start
+from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.sets import Members, Sets, fitted_in, ranked, searched
@@ -28,7 +29,7 @@ from aqualog.model.term import Model
 __all__ = ["Found", "Option", "compete"]
 
 ROUNDS = 3  # of the competition around its own best set
-COVERED, REFITTED = 0.98, 8  # share of the posterior that is refitted, and the most sets
+COVERED, REFITTED = 0.999, 10  # share of the posterior that is refitted, and the most sets
 
 
 class Option(NamedTuple):
@@ -44,7 +45,7 @@ class Found(NamedTuple):
     `options`: sets, most likely first; none where there are unknown `forms`, or the test finds no more than chance.
     """
 
-    lib: Library
+    evidence: Evidence
     significance: Significance
     gram: FloatArray
     calibration: Calibration
@@ -60,7 +61,7 @@ class _Ring:
 
     passes: Passes
     given: Model
-    asked: tuple[Hypothesis, ...]
+    evidence: Evidence
     blocks: tuple[Block, ...]
     sd: FloatArray
     shapes: tuple[Shape, ...]
@@ -68,14 +69,16 @@ class _Ring:
 
     def name(self, block: int) -> str:
         b = self.blocks[block]
-        return self.asked[b.tag].effect.name if b.kind == "effect" else f"{self.shapes[b.tag].mechanism.name}()"
+        return (
+            self.evidence.asked[b.tag].effect.name if b.kind == "effect" else f"{self.shapes[b.tag].mechanism.name}()"
+        )
 
     @property
     def known(self) -> tuple[Block, ...]:
         return tuple(b for b in self.blocks if b.kind == "effect")
 
-    def sets(self, stand: _Stand, blocks: Sequence[Block], gram: FloatArray) -> Sets:
-        return ranked(searched(blocks, gram, rule(stand.lib.evidence, blocks, gram)), self.name)
+    def sets(self, blocks: Sequence[Block], gram: FloatArray) -> Sets:
+        return ranked(searched(blocks, gram, rule(self.evidence, blocks, gram)), self.name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +106,7 @@ def compete(
     say("signatures of the effects")
     lib = library(passes, given, asked, given)
     shapes, functions = shapes_of(passes)
-    ring = _Ring(passes, given, asked, *blocks_of(lib.evidence, shapes), shapes, functions)
+    ring = _Ring(passes, given, lib.evidence, *blocks_of(lib.evidence, shapes), shapes, functions)
     y = passes.values - lib.base
     nothing = Refit((), np.zeros(0), given, y, np.zeros((*y.shape, 0)), at_bound=False)
     stand = _Stand(nothing, lib, y, fit(y, lib.x, lib.road, passes.nuisances))
@@ -120,12 +123,12 @@ def compete(
     if not forms and test.p_value <= level:
         say("refitting the sets of effects")
         options = _options(ring, stand, nothing)
-    return Found(lib, test, plain, calibration, stand.scatter, nothing, forms, options)
+    return Found(lib.evidence, test, plain, calibration, stand.scatter, nothing, forms, options)
 
 
 def _refitted(ring: _Ring, stand: _Stand, members: Members, gram: FloatArray) -> Refit:
     linear = fitted_in(ring.known, gram, members)
-    return refit(ring.passes, ring.given, [ring.asked[m] for m in members], linear.mean, stand.scatter.weight)
+    return refit(ring.passes, ring.given, [ring.evidence.asked[m] for m in members], linear.mean, stand.scatter.weight)
 
 
 def _repeated(ring: _Ring, stand: _Stand) -> _Stand:
@@ -133,11 +136,11 @@ def _repeated(ring: _Ring, stand: _Stand) -> _Stand:
     done: Members = ()
     for _ in range(ROUNDS):
         gram = stand.gram(ring.passes)
-        best = ring.sets(stand, ring.known, gram).best
+        best = ring.sets(ring.known, gram).best
         if best == done:
             break
         found = _refitted(ring, stand, best, gram)
-        lib = library(ring.passes, found.model, ring.asked, ring.given)
+        lib = library(ring.passes, found.model, ring.evidence.asked, ring.given)
         own = [c for m in best for c in ring.known[m].columns]
         scatter = fit(found.residual, lib.x, lib.road, ring.passes.nuisances, stand.scatter)
         stand, done = _Stand(found, lib, found.residual + lib.x[:, :, own] @ found.theta, scatter), best
@@ -150,7 +153,7 @@ def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...]
     after: Members = ()
     for _ in range(ROUNDS):
         gram = stand.gram(passes, ring.functions)
-        sets = ring.sets(stand, ring.blocks, gram)
+        sets = ring.sets(ring.blocks, gram)
         new = tuple(m for m in sets.best if ring.blocks[m].kind == "shape")
         if new == after:
             break
@@ -175,23 +178,12 @@ def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...]
 def _options(ring: _Ring, stand: _Stand, nothing: Refit) -> tuple[Option, ...]:
     """The sets that hold most of the posterior, refitted, with the evidence about their own values."""
     gram = stand.gram(ring.passes)
-    sets = ring.sets(stand, ring.known, gram)
-    chosen: list[Members] = []
-    total = 0.0
-    for (members, _), q in zip(sets.sets, sets.probability.tolist(), strict=True):
-        if total < COVERED and len(chosen) < REFITTED and members:
-            chosen.append(members)
-        total += q
-    out = [Option(nothing, -0.5 * _cost(nothing, ring, stand))]
-    for members in chosen:
-        found = _refitted(ring, stand, members, gram)
-        if not found.at_bound:
-            out.append(Option(found, _evidence(ring, stand, found, members)))
+    sets = ring.sets(ring.known, gram)
+    enough = 1 + int(np.searchsorted(np.cumsum(sets.probability), COVERED))
+    chosen = [members for members, _ in sets.sets[: min(enough, REFITTED)] if members]
+    refits = [(members, _refitted(ring, stand, members, gram)) for members in chosen]
+    out = [Option(r, _evidence(ring, stand, r, members)) for members, r in [((), nothing), *refits] if not r.at_bound]
     return tuple(sorted(out, key=lambda o: -o.evidence))
-
-
-def _cost(found: Refit, ring: _Ring, stand: _Stand) -> float:
-    return float(inner(found.x, found.residual, ring.passes.nuisances, stand.scatter.weight)[-1, -1])
 
 
 def _evidence(ring: _Ring, stand: _Stand, found: Refit, members: Members) -> float:

@@ -115,16 +115,23 @@ def refit(passes: Passes, given: Model, members: Sequence[Hypothesis], start: Fl
 
 def settled(found: Refit, passes: Passes, weight: FloatArray, by: NDArray[np.int64] | None = None) -> FloatArray:
     """Residual (g, c) with the free sizes (radii, delay) and the set's values at their best on the runs `by`."""
-    rest = np.arange(len(found.residual)) if by is None else by
-    both = np.concatenate([passes.nuisances, found.x], axis=-1)
-    prior = prior_of(passes.nuisances.shape[-1], found.theta.size)
-    prior[prior.size - found.theta.size :] /= PRIOR_WIDTH**2
-    y = found.residual[rest]
-    x = np.where(np.isfinite(y)[:, :, None], both[rest], 0.0)
-    wx = weight[rest] @ x
-    pull = np.append(np.zeros(passes.nuisances.shape[-1]), -found.theta)
-    a, b = np.einsum("rck,rcl->kl", x, wx), np.einsum("rck,rc->k", wx, np.nan_to_num(y))
-    return np.asarray(found.residual - both @ (inverse_of(a + np.diag(prior)) @ (b + prior * pull)))
+    x, _, size = _solved(found, passes, weight, np.arange(len(found.residual)) if by is None else by)
+    return np.asarray(found.residual - x @ size)
+
+
+def _solved(
+    found: Refit, passes: Passes, weight: FloatArray, by: NDArray[np.int64]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """All columns (g, c, k), covariance (k, k) and sizes (k,) beside the set's values, by some of the runs."""
+    k, free = found.theta.size, passes.nuisances.shape[-1]
+    x = np.concatenate([passes.nuisances, found.x], axis=-1)
+    prior = np.append(prior_of(free), np.full(k, PRIOR_WIDTH**-2.0))
+    y = found.residual[by]
+    own = np.where(np.isfinite(y)[:, :, None], x[by], 0.0)
+    wx = weight[by] @ own
+    covariance = inverse_of(np.einsum("rck,rcl->kl", own, wx) + np.diag(prior))
+    pull = prior * np.append(np.zeros(free), -found.theta)
+    return x, covariance, covariance @ (np.einsum("rck,rc->k", wx, np.nan_to_num(y)) + pull)
 
 
 def estimates(found: Refit, passes: Passes, weight: FloatArray) -> list[Estimate]:
@@ -133,20 +140,17 @@ def estimates(found: Refit, passes: Passes, weight: FloatArray) -> list[Estimate
     Cluster-robust variance with one run as the unit (each run's residual blown up by its own leverage), at least that
     of the model; Student's t with the runs less the sizes that were fitted.
     """
-    k, free = found.theta.size, passes.nuisances.shape[-1]
-    both = np.concatenate([passes.nuisances, found.x], axis=-1)
-    both = np.where(np.isfinite(found.residual)[:, :, None], both, 0.0)
-    wb = weight @ both
-    inverse = inverse_of(np.einsum("rck,rcl->kl", both, wb) + np.diag(np.append(prior_of(free), np.zeros(k))))
-    y = np.nan_to_num(found.residual)
-    e = y - both @ (inverse @ np.einsum("rck,rc->k", wb, y))
-    hat = np.einsum("rck,kl,rdl->rcd", both, inverse, wb)
-    grown = np.linalg.solve(np.eye(e.shape[1]) - np.clip(hat, -0.95, 0.95), e[:, :, None])[:, :, 0]
-    scores = np.einsum("rck,rc->rk", wb, grown)
-    robust = inverse @ (scores.T @ scores) @ inverse
-    runs = int(np.isfinite(found.residual).any(axis=1).sum())
-    wide = student_quantile(0.975, max(runs - k - 2, 1))
-    sd = np.sqrt(np.maximum(np.maximum(np.diag(robust), np.diag(inverse)), 0.0))[free:]
+    known = np.isfinite(found.residual)
+    x, covariance, size = _solved(found, passes, weight, np.arange(len(known)))
+    x = np.where(known[:, :, None], x, 0.0)
+    e, wx = np.nan_to_num(found.residual) - x @ size, weight @ x
+    hat = np.einsum("rck,kl,rdl->rcd", x, covariance, wx)
+    grown = np.linalg.solve(np.eye(e.shape[1]) - np.clip(hat, -0.95, 0.95), e[:, :, None])
+    scores = (wx.transpose(0, 2, 1) @ grown)[:, :, 0]
+    robust = covariance @ (scores.T @ scores) @ covariance
+    k = found.theta.size
+    wide = student_quantile(0.975, max(int(known.any(axis=1).sum()) - k - 2, 1))
+    sd = np.sqrt(np.maximum(np.diag(robust), np.diag(covariance)))[size.size - k :]
     out = []
     names = [(h, n) for h in found.members for n in h.free]
     for (h, name), s in zip(names, sd.tolist(), strict=True):

@@ -114,7 +114,7 @@ def _not_testable(data: CampaignData, passes: Passes, given: Model, wet: int) ->
 def _diagnosed(
     data: CampaignData, passes: Passes, found: Found, d: Decision[Option], won: Gain | None, level: float
 ) -> Diagnosis:
-    evidence, c, p = found.lib.evidence, found.calibration, found.significance.p_value
+    evidence, c, p = found.evidence, found.calibration, found.significance.p_value
     after = d.best.option.refit if d.best is not None and d.verdict != "cannot_tell" else found.nothing
     # limits are what the runs show, whether or not it is worth naming
     sizes = isolate.reference_sizes(
