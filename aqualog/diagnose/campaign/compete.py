@@ -128,7 +128,9 @@ def compete(
 
 def _refitted(ring: _Ring, stand: _Stand, members: Members, gram: FloatArray) -> Refit:
     linear = fitted_in(ring.known, gram, members)
-    return refit(ring.passes, ring.given, [ring.evidence.asked[m] for m in members], linear.mean, stand.scatter.weight)
+    own = [ring.evidence.asked[m] for m in members]
+    x = stand.lib.x[:, :, linear.columns]
+    return refit(ring.passes, ring.given, own, linear.mean, x, stand.scatter.weight)
 
 
 def _repeated(ring: _Ring, stand: _Stand) -> _Stand:

@@ -21,7 +21,7 @@ __all__ = ["Refit", "estimates", "refit", "settled"]
 
 ROUNDS = 6
 STEP = 0.1  # prior standard deviations, of a finite difference
-DONE = 0.02  # standard errors
+DONE = 0.1  # standard errors
 EDGE = 1e-6
 
 
@@ -51,7 +51,9 @@ class Refit:
         return "+".join(sorted(h.key for h in self.members)) or "none"
 
 
-def refit(passes: Passes, given: Model, members: Sequence[Hypothesis], start: FloatArray, weight: FloatArray) -> Refit:
+def refit(
+    passes: Passes, given: Model, members: Sequence[Hypothesis], start: FloatArray, x: FloatArray, weight: FloatArray
+) -> Refit:
     """Fit a set by Gauss-Newton with the prior of each parameter, within its physical bounds.
 
     Parameters
@@ -63,6 +65,8 @@ def refit(passes: Passes, given: Model, members: Sequence[Hypothesis], start: Fl
         Empty for the model as it is.
     start : array (k,)
         In prior standard deviations.
+    x : array (g, c, k)
+        Change of the observations by one of those near the start.
     weight : array (g, c, c)
         Precision of each run.
     """
@@ -91,8 +95,7 @@ def refit(passes: Passes, given: Model, members: Sequence[Hypothesis], start: Fl
 
     theta = np.clip(start, low, high)
     model, e = at(theta)
-    least = loss(e, theta)
-    x = slopes(e, theta)
+    least, fresh = loss(e, theta), False
     for _ in range(ROUNDS if theta.size else 0):
         A = inner(x, e, passes.nuisances, weight)
         full = A[:-1, :-1] + np.eye(theta.size) / PRIOR_WIDTH**2
@@ -103,12 +106,15 @@ def refit(passes: Passes, given: Model, members: Sequence[Hypothesis], start: Fl
             if loss(e_there, there) <= least:
                 break
         else:
-            break
+            if fresh:
+                break
+            x, fresh = slopes(e, theta), True
+            continue
         moved = there - theta
         theta, model, e, least = there, new, e_there, loss(e_there, there)
-        x = slopes(e, theta)
         if float(moved @ full @ moved) < DONE**2:
             break
+        x, fresh = slopes(e, theta), True
     at_bound = bool(np.any(((theta <= low + EDGE) | (theta >= high - EDGE)) & (np.abs(theta) >= EDGE)))
     return Refit(tuple(members), theta, model, e, x, at_bound)
 
