@@ -132,7 +132,7 @@ def test_track_clearing_is_named_with_its_size(cleared):
     assert size.low < 3e-4 < size.high
     assert any(c.startswith("slip_slope_r") for c in cause.explains)
     assert found.gain.low > 0.0
-    assert found.model.terms[0].effect.name == "track_clearing"
+    assert [t.effect.name for t in found.model.terms] == ["track_clearing"]
     one, again = (diagnose_campaign(cleared.configured.campaign, cleared, seed=1, surrogates=9) for _ in range(2))
     assert again.sentence == one.sentence
     assert again.significance == one.significance
