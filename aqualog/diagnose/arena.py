@@ -25,7 +25,7 @@ from aqualog.diagnose.spectrum import Weighing, weighing
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
 
-__all__ = ["Arena", "Part", "arena_of", "known_only", "make_arena", "unit_force"]
+__all__ = ["Arena", "Part", "arena_of", "blocks_of", "known_only", "make_arena", "unit_force"]
 
 # of an effect at any place, of a shape of a mechanism, and of a road that is not even, on one drive (K)
 KNOWN_PRIOR, SHAPE_PRIOR, ROAD_PRIOR = 0.03, 0.01, 0.2
@@ -185,7 +185,7 @@ def arena_of(evidence: Evidence, forces: Sequence[FloatArray]) -> Arena:
     made = shapes(joint, mask, block_step(evidence.drives[chosen[0][0]].dt), list(parts[0].responses))
     ends = np.cumsum([0, *(p.mask.size for p in parts)])
     rows = tuple(slice(a, b) for a, b in pairwise(ends.tolist()))
-    blocks, sd = _blocks(evidence, made)
+    blocks, sd = blocks_of(evidence, made)
     return Arena(evidence, tuple(parts), rows, made, blocks, sd, _tolerance(evidence, made, blocks, sd))
 
 
@@ -225,7 +225,8 @@ def _stretches(drives: Sequence[Drive]) -> list[tuple[int, slice]]:
     return out
 
 
-def _blocks(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, ...], FloatArray]:
+def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, ...], FloatArray]:
+    """What competes, and the prior size of every column."""
     places = Counter(h.effect.name for h in evidence.asked)
     each = Counter(s.mechanism.name for s in made)
     sd = [evidence.prior]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,16 +18,14 @@ from aqualog.diagnose.probability import SURE, tempered
 from aqualog.diagnose.records import Alternative, Cause, Estimate, Verdict
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import Found, Option, sharpened
+from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence
 from aqualog.model.term import Model
 
 __all__ = ["Outcome", "conclude", "with_causes"]
 
 Z = 1.959964  # 97.5 % quantile of the normal distribution
-CREDIBLE = 20.0  # evidence ratio within which places of one effect cannot be distinguished
-PLACES = 5.0  # evidence ratio within which the whole car is preferred to a part of it
 EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect explains it
-LEAST_SHARE = 1e-4  # probability of a set, below which its values are not looked at
 
 
 class Outcome(NamedTuple):
@@ -53,24 +51,6 @@ class Rival(NamedTuple):
     probability: float
 
 
-@dataclass(frozen=True, slots=True)
-class _Set:
-    """A set's causes, whether each is worth naming, and its share of the posterior."""
-
-    option: Option
-    causes: tuple[tuple[Cause, bool], ...]
-    share: float
-    sharp: float = math.nan
-
-    @property
-    def large(self) -> tuple[Cause, ...]:
-        return tuple(c for c, is_large in self.causes if is_large)
-
-    @property
-    def names(self) -> frozenset[str]:
-        return frozenset(c.effect for c in self.large)
-
-
 def conclude(found: Found, model: Model) -> Outcome:
     """The verdict on what a search found.
 
@@ -84,79 +64,28 @@ def conclude(found: Found, model: Model) -> Outcome:
         causes = (replace(c, probability=share.get(c.effect, 0.0)) for c, large in linear if large)
         beside = tuple(c for c in causes if c.probability >= SURE)
         return Outcome("unexplained", beside, certain=frozenset(c.effect for c in beside))
-    sets = _sets(found, model)
-    groups: dict[frozenset[str], list[_Set]] = {}
-    for s in sets:
-        groups.setdefault(s.names, []).append(s)
-    ranked = sorted(groups.values(), key=lambda g: -sum(s.share for s in g))
-    marginal: dict[str, float] = {}
-    for s in sets:
-        for n in s.names:
-            marginal[n] = marginal.get(n, 0.0) + s.share
-    if not ranked or not ranked[0][0].names:
-        first = ranked[0][0].causes if ranked else ()
-        return Outcome("no_effect", (), small=_small([c for c, large in first if not large]))
-    best = _at_place(found, ranked[0], model)
-    own = _with_probability(best.large, marginal)
-    small = _small([c for c, is_large in best.causes if not is_large]) + _other_places(best, ranked[0])
-    chosen = best.option.refit
-    failed = repeats(chosen, found.arena, [w.noise for w in found.posterior.weighings], model) if chosen else ()
-    if chosen is not None and chosen.at_bound:
-        failed = (*failed, "a value stands at its physical bound.")
-    unsure = frozenset(c.effect for c in own if c.probability < SURE)
-    if not unsure and not failed:
-        verdict: Verdict = "named" if len(own) == 1 else "compound"
-        return Outcome(verdict, own, (), chosen, small, best.names)
-    others, total = [], sum(s.share for s in ranked[0])
-    rivals = [(best, total)]
-    for g in ranked[1:]:
-        if total >= SURE:
-            break
-        weight = sum(s.share for s in g)
-        total += weight
-        if g[0].names:
-            ratio = math.exp(min(max(ranked[0][0].option.evidence - g[0].option.evidence, 0.0), 700.0))
-            rivals.append((_at_place(found, g, model), weight))
-            others.append(Alternative(_with_probability(rivals[-1][0].large, marginal), ratio))
-    shown = {c.effect: c for a in reversed(others) for c in a.causes} | {c.effect: c for c in own}
-    names = [c.effect for c in own] + [n for n in shown if n not in best.names]
-    certain = frozenset() if failed else best.names - unsure
-    ordered = sorted(names, key=lambda n: n not in certain)
-    small += tuple(f"Not named: {reason}" for reason in failed)
+
+    def failing(best: Candidate[Option]) -> tuple[str, ...]:
+        chosen, noises = best.option.refit, [w.noise for w in found.posterior.weighings]
+        if chosen is None:
+            return ()
+        failed = repeats(chosen, found.arena, noises, model)
+        return (*failed, "a value stands at its physical bound.") if chosen.at_bound else failed
+
+    def causes_of(o: Option) -> tuple[tuple[Cause, bool], ...]:
+        if o.refit is not None:
+            return tuple(_refitted(found, o.refit, model))
+        return tuple(_linear(found.arena, found.posterior, o.members, model))
+
+    sets = candidates([(o, o.evidence) for o in found.options], causes_of)
+    d = decided(sets, lambda group: _at_place(found, group, model), failing)
     return Outcome(
-        "cannot_tell", tuple(shown[n] for n in ordered), tuple(others), chosen, small, certain,
-        tuple(Rival(s.option.refit, q / total) for s, q in rivals if s.option.refit is not None),
+        d.verdict, d.causes, d.alternatives, d.best.option.refit if d.best else None, d.notes, d.certain,
+        tuple(Rival(s.option.refit, q) for s, q in d.rivals if s.option.refit is not None),
     )  # fmt: skip
 
 
-def _with_probability(causes: Sequence[Cause], marginal: dict[str, float]) -> tuple[Cause, ...]:
-    return tuple(replace(c, probability=tempered(marginal.get(c.effect, 0.0))) for c in causes)
-
-
-def _small(causes: Sequence[Cause]) -> tuple[str, ...]:
-    return tuple(f"Significant, but too small to be worth naming: {c.sentence}" for c in causes)
-
-
-def _sets(found: Found, model: Model) -> list[_Set]:
-    """Options with their causes and shares, most likely first."""
-    if not found.options:
-        return []
-    z = np.array([o.evidence for o in found.options])
-    p = np.exp(z - z.max())
-    p /= p.sum()
-    out = []
-    for o, share in zip(found.options, p.tolist(), strict=True):
-        if share < LEAST_SHARE:
-            continue
-        if o.refit is not None:
-            causes = _refitted(found, o.refit, model)
-        else:
-            causes = _linear(found.arena, found.posterior, o.members, model)
-        out.append(_Set(o, tuple(causes), share))
-    return sorted(out, key=lambda s: -s.share)
-
-
-def _at_place(found: Found, group: Sequence[_Set], model: Model) -> _Set:
+def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) -> Candidate[Option]:
     """The set at the whole car, unless another place is clearly better; with the values that a metric of few
     tolerances gives."""
     top = group[0].share
@@ -171,22 +100,7 @@ def _at_place(found: Found, group: Sequence[_Set], model: Model) -> _Set:
         # with fewer tolerances a value may fall below what is worth naming
         sharp.append(kept if kept.names == s.names else replace(s, sharp=loss))
     best = min(sharp, key=lambda s: s.sharp)
-    return max(
-        [best, *(s for s in sharp if s.sharp - best.sharp < 2.0 * math.log(PLACES))], key=lambda s: _whole(s.causes)
-    )
-
-
-def _whole(causes: Sequence[tuple[Cause, bool]]) -> int:
-    return sum(c.where is None for c, _ in causes)
-
-
-def _other_places(best: _Set, group: Sequence[_Set]) -> tuple[str, ...]:
-    """Sentences about the same effects at other places that explain the log as well, or nearly so."""
-    own = {c.key for c in best.large}
-    near = [s for s in group if s.share * CREDIBLE > group[0].share]
-    return tuple(
-        dict.fromkeys(f"Equally possible: {c.sentence}" for s in near for c in s.large if c.key not in own)
-    )  # fmt: skip
+    return max([best, *(s for s in sharp if s.sharp - best.sharp < 2.0 * math.log(PLACES))], key=whole)
 
 
 def _refitted(found: Found, r: Refit, model: Model) -> list[tuple[Cause, bool]]:

@@ -134,9 +134,9 @@ class Remainder:
     """An unknown form as a function: value and simultaneous 95 % band, NaN where the drive was not.
 
     `x` (k, d) points of the coordinates `depends_on` [SI], `f`, `low`, `high` (k,) in `unit`, or in the channel's if
-    that is empty; `mechanism` that it acts through, None of a campaign; `share` of the channel's variance that it
+    that is empty; `mechanism` that it acts through; `share` of the channel's variance that it
     explains; `proxies`: coordinates that explain it nearly as well; `nearest`: effect whose signature is most alike,
-    with the cosine; `p_value` of a campaign's test, `probability` of a drive's mechanism.
+    with the cosine; `probability` of the mechanism; `p_value` NaN where no test was made.
     """
 
     channel: str

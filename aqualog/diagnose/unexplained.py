@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -12,12 +13,14 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.compete import Fitted, Posterior, fitted
-from aqualog.diagnose.competition import added, scored, start
+from aqualog.diagnose.competition import Block
 from aqualog.diagnose.probability import SURE, tempered
 from aqualog.diagnose.records import Remainder
+from aqualog.diagnose.sets import Sets, evidence_of
+from aqualog.diagnose.shapes import Shape
 from aqualog.diagnose.unknown_term import describe
 
-__all__ = ["evidence_of", "unknown_forms"]
+__all__ = ["Clear", "Field", "clear_forms", "described", "unknown_forms"]
 
 AHEAD = 3.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
@@ -28,42 +31,75 @@ ALIKE = 0.2  # share of the best coordinate's probability from which the drive c
 DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points together
 
 
+class Field(Protocol):
+    """What competes: blocks, the shapes that some of them are, and the prior size of each column."""
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """Of known effects and of shapes."""
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """Of the blocks' tags."""
+
+    @property
+    def sd(self) -> FloatArray:
+        """By which columns are scaled."""
+
+    def name(self, block: int) -> str:
+        """Name by which probabilities add up."""
+
+
+class Clear(NamedTuple):
+    """A mechanism that no known effect replaces: its blocks, `first` the most needed one, and its probability.
+
+    `loss`: what the best set loses without it [nats (natural logarithm)].
+    """
+
+    own: tuple[int, ...]
+    first: int
+    probability: float
+    loss: float
+
+
+def clear_forms(field: Field, found: Sets, inner: FloatArray) -> list[Clear]:
+    """Mechanisms of the best set that no known effect replaces, what explains most first.
+
+    A mechanism counts if its share of the posterior is 0.95, the best set is e^3 times as likely as every set of known
+    effects, and it explains a fifth of what the set explains.
+    """
+    blocks, name, best = field.blocks, field.name, found.best
+    known = max(e for members, e in found.sets if all(blocks[m].kind != "shape" for m in members))
+    if found.sets[0][1] - known < AHEAD:
+        return []
+    whole = evidence_of(blocks, inner, best)
+    out = []
+    shapes = [m for m in best if blocks[m].kind == "shape"]
+    for n in dict.fromkeys(name(m) for m in shapes):
+        own = tuple(m for m in shapes if name(m) == n)
+        # over two coordinates that go together, either could be left out; the mechanism could not
+        loss = whole - evidence_of(blocks, inner, [m for m in best if m not in own])
+        if found.marginal[n] >= SURE and loss >= PART * whole:
+            first = min(own, key=lambda m: evidence_of(blocks, inner, [o for o in best if o != m]))
+            out.append(Clear(own, first, tempered(found.marginal[n]), loss))
+    return sorted(out, key=lambda c: -c.loss)
+
+
 def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
     """Shapes of the best set that no known effect replaces, what explains most first; empty if none is that clear.
 
-    A mechanism counts if its share of the posterior is 0.95, the best set is e^3 times as likely as every set of known
-    effects, and it explains a fifth of what the set explains and 5 % of a channel's variance.
+    Beside the conditions of `clear_forms`, a mechanism must explain 5 % of a channel's variance.
     """
-    blocks = arena.blocks
-    best = posterior.best
-    known = max(e for members, e in posterior.sets if all(blocks[m].kind != "shape" for m in members))
-    if posterior.sets[0][1] - known < AHEAD:
+    clear = clear_forms(arena, posterior, posterior.tolerant)
+    if not clear:
         return ()
-    whole = evidence_of(arena, posterior.tolerant, best)
-    fit = fitted(arena, posterior.tolerant, best)
+    fit = fitted(arena, posterior.tolerant, posterior.best)
     found = []
-    shapes = [m for m in best if blocks[m].kind == "shape"]
-    for name in dict.fromkeys(arena.name(m) for m in shapes):
-        own = [m for m in shapes if arena.name(m) == name]
-        if posterior.marginal[name] < SURE:
-            continue
-        probability = tempered(posterior.marginal[name])
-        # over two coordinates that go together, either could be left out; the mechanism could not
-        loss = whole - evidence_of(arena, posterior.tolerant, [m for m in best if m not in own])
-        channel, share = _where(arena, own, fit)
-        if loss >= PART * whole and channel is not None:
-            first = min(own, key=lambda m: evidence_of(arena, posterior.tolerant, [o for o in best if o != m]))
-            found.append((loss, _described(arena, posterior, first, fit, probability, channel, share, seed)))
-    return tuple(r for _, r in sorted(found, key=lambda x: -x[0]))
-
-
-def evidence_of(arena: Arena, tolerant: FloatArray, members: Sequence[int]) -> float:
-    """Log of the marginal likelihood that a set gains, without its prior. [nats (natural logarithm)]"""
-    state, total = start(tolerant), 0.0
-    for m in members:
-        total += scored(state, arena.blocks[m])[0]
-        state = added(state, m, arena.blocks[m])
-    return total
+    for c in clear:
+        channel, share = _where(arena, c.own, fit)
+        if channel is not None:
+            found.append(described(arena, posterior, posterior.gram, fit, c, channel, share, seed))
+    return tuple(found)
 
 
 def _own(arena: Arena, m: int, fit: Fitted) -> list[int]:
@@ -94,28 +130,29 @@ def _where(arena: Arena, members: Sequence[int], fit: Fitted) -> tuple[str | Non
     return (max(told)[1], max(told)[0]) if told else (None, 0.0)
 
 
-def _described(
-    arena: Arena, posterior: Posterior, m: int, fit: Fitted, probability: float, channel: str, share: float, seed: int
+def described(
+    field: Field, found: Sets, gram: FloatArray, fit: Fitted, clear: Clear, channel: str, share: float, seed: int
 ) -> Remainder:  # fmt: skip
-    block = arena.blocks[m]
-    s = arena.shapes[block.tag]
-    own = _own(arena, m, fit)
-    at = s.basis.at_points * arena.sd[list(block.columns)]
+    """A mechanism of the best set as a function with its band, from a fit of that set."""
+    m, block = clear.first, field.blocks[clear.first]
+    s = field.shapes[block.tag]
+    own = [fit.columns.index(c) for c in block.columns]
+    at = s.basis.at_points * field.sd[list(block.columns)]
     f = at @ fit.mean[own]
     half = _band(at, fit.covariance[np.ix_(own, own)], s.basis.supported, seed)
     f, half = (np.where(s.basis.supported, x, np.nan) for x in (f, half))
     others = {
-        arena.shapes[arena.blocks[o].tag].coordinates: q
-        for o, q in posterior.blocks.items()
-        if o != m and arena.blocks[o].kind == "shape" and arena.name(o) == arena.name(m) and q >= NOTABLE
+        field.shapes[field.blocks[o].tag].coordinates: q
+        for o, q in found.blocks.items()
+        if o != m and field.blocks[o].kind == "shape" and field.name(o) == field.name(m) and q >= NOTABLE
     }
-    alike = sorted({n for c, q in others.items() if q >= ALIKE * posterior.blocks[m] for n in c} - set(s.coordinates))
-    nearest, cosine = _nearest(arena, posterior.gram, m, fit.mean[own])
-    found = Remainder(
+    alike = sorted({n for c, q in others.items() if q >= ALIKE * found.blocks[m] for n in c} - set(s.coordinates))
+    nearest, cosine = _nearest(field.blocks, gram, m, fit.mean[own])
+    r = Remainder(
         channel, s.coordinates, share, math.nan, s.basis.points, f, f - half, f + half, tuple(alike), nearest, cosine,
-        "", s.mechanism.name, s.mechanism.unit, probability,
+        "", s.mechanism.name, s.mechanism.unit, clear.probability,
     )  # fmt: skip
-    return replace(found, sentence=describe(s.mechanism, found))
+    return replace(r, sentence=describe(s.mechanism, r))
 
 
 def _band(at: FloatArray, covariance: FloatArray, supported: BoolArray, seed: int) -> FloatArray:
@@ -127,12 +164,12 @@ def _band(at: FloatArray, covariance: FloatArray, supported: BoolArray, seed: in
     return np.asarray(sd * float(np.quantile(most, LEVEL)))
 
 
-def _nearest(arena: Arena, gram: FloatArray, m: int, mean: FloatArray) -> tuple[str | None, float]:
+def _nearest(blocks: Sequence[Block], gram: FloatArray, m: int, mean: FloatArray) -> tuple[str | None, float]:
     """The known effect whose signature is most alike, with the cosine."""
-    c = list(arena.blocks[m].columns)
+    c = list(blocks[m].columns)
     energy = float(mean @ gram[np.ix_(c, c)] @ mean)
     best: tuple[str | None, float] = (None, 0.0)
-    for b in arena.blocks:
+    for b in blocks:
         if b.kind != "effect" or len(b.columns) > 1 or energy <= 0.0:
             continue
         e = b.columns[0]

@@ -101,6 +101,9 @@ _COORDINATES: dict[str, tuple[str, str]] = {
     "drive_sign": ("driving or braking", "-"),
     "steer_angle": ("steer angle", "rad"),
     "yaw_rate": ("yaw rate", "rad/s"),
+    "depth": ("water depth", "m"),  # of a campaign's runs, like the next ones
+    "pressure": ("tyre pressure", "Pa"),
+    "load": ("load", "kg"),
 }
 _CHANNELS: dict[str, tuple[str, str]] = {
     "force_balance": ("force balance", "m/s²"),
@@ -128,7 +131,7 @@ def describe(mechanism: Mechanism, r: Remainder) -> str:
         text += f"; {quantity(float(r.f[at]), mechanism.unit, change=True)} at {there}"
     text += ")."
     if r.proxies:
-        text += f" This drive cannot distinguish it from {_list(r.proxies)}."
+        text += f" It cannot be distinguished from {_list(r.proxies)} here."
     if {"t", "position"} & set(r.depends_on):
         text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."
     if r.nearest is not None:

@@ -83,11 +83,12 @@ def verdict_sentence(
     reason: str = "",
     certain: frozenset[str] = frozenset(),
     seen: float | None = None,
+    source: str = "log",
 ) -> str:
     """The verdict in one sentence.
 
     `certain`: effects that are certain where others cannot be distinguished; `seen`: the test's p-value where it
-    found more than noise.
+    found more than noise; `source`: `log` or `campaign`.
     """
     names = [name_of(c.effect, c.where) for c in causes]
     if verdict == "no_effect" and seen is not None:
@@ -102,11 +103,12 @@ def verdict_sentence(
         sure = [name_of(c.effect, c.where) for c in causes if c.effect in certain]
         open_ones = [name_of(c.effect, c.where) for c in causes if c.effect not in certain]
         if sure and open_ones:
-            return f"Certain: {listed(sure)}. This log cannot distinguish the other causes: {listed(open_ones, 'or')}."
+            others = listed(open_ones, "or")
+            return f"Certain: {listed(sure)}. This {source} cannot distinguish the other causes: {others}."
         if len(causes) == 1 and not sure:
             odds = "" if math.isnan(causes[0].probability) else f" (probability {causes[0].probability:.2f})"
-            return f"The car may differ from the model, but this log does not make it certain: {names[0]}{odds}."
-        return f"The car differs from the model, but this log cannot distinguish {listed(names)}."
+            return f"The car may differ from the model, but this {source} does not make it certain: {names[0]}{odds}."
+        return f"The car differs from the model, but this {source} cannot distinguish {listed(names)}."
     if verdict == "unexplained":
         known = f" beside {listed(names)}" if names else ""
         return f"The car differs from the model{known} in a way that no effect of the library explains{reason}."

@@ -11,7 +11,7 @@ from aqualog.campaign.measure import measure
 from aqualog.core.intervals import chi2_log_p
 from aqualog.diagnose.campaign import diagnose_campaign
 from aqualog.diagnose.campaign.expect import Driven, respond
-from aqualog.diagnose.campaign.noise import design_of, fit
+from aqualog.diagnose.campaign.noise import fit
 from aqualog.diagnose.campaign.observe import passes_of
 from aqualog.diagnose.campaign.passes import expected_values
 from aqualog.model.effects import EFFECTS
@@ -91,10 +91,10 @@ def test_scatter_of_runs_is_found_beside_the_sizes_of_columns():
     x = rng.standard_normal((400, 2, 2))
     y = x @ np.array([2.0, -1.0]) + rng.multivariate_normal(np.zeros(2), sigma, 400)
     y[::5, 0] = np.nan
-    found = fit(design_of(y, x, np.zeros_like(y), np.zeros(2)))
+    found = fit(y, np.zeros((400, 2, 0)), np.zeros_like(y), x)
     assert found.size == pytest.approx([2.0, -1.0], abs=0.2)
-    ratio = found.scatter.sigma / sigma
-    assert np.all((ratio > 0.65) & (ratio < 1.2)), found.scatter.sigma  # heavy tails take some of a normal's spread
+    ratio = found.sigma / sigma
+    assert np.all((ratio > 0.65) & (ratio < 1.2)), found.sigma  # heavy tails take some of a normal's spread
 
 
 def simulated(model, seed, runs=40):
@@ -127,11 +127,12 @@ def test_track_clearing_is_named_with_its_size(cleared):
     assert found.verdict == "named", found.sentence
     (cause,) = found.causes
     assert cause.key == "track_clearing"
+    assert cause.probability >= 0.95
     size = cause.parameters["delta_film"]
     assert size.low < 3e-4 < size.high
     assert any(c.startswith("slip_slope_r") for c in cause.explains)
     assert found.gain.low > 0.0
-    assert found.model.terms[0].effect.name == "track_clearing"
+    assert [t.effect.name for t in found.model.terms] == ["track_clearing"]
     one, again = (diagnose_campaign(cleared.configured.campaign, cleared, seed=1, surrogates=9) for _ in range(2))
     assert again.sentence == one.sentence
     assert again.significance == one.significance
@@ -145,6 +146,18 @@ def test_nothing_hidden_is_told_as_nothing():
     shown = {(x.effect, x.where): x.size for x in found.limits}
     assert 0.0 < shown["contact_loss", None] < 0.3
     assert 0.0 < shown["track_clearing", None] < 3e-4
+
+
+def test_a_hump_of_no_effect_is_an_unknown_form():
+    data = world(119, Hidden(hump=0.08))
+    found = diagnose_campaign(data.configured.campaign, data, seed=1, surrogates=99)
+    assert found.verdict == "unexplained", found.sentence
+    assert found.causes == ()
+    form = found.remainders[0]
+    assert (form.mechanism, form.depends_on) == ("resistance", ("v_x",))
+    assert form.probability >= 0.95
+    assert abs(3.6 * form.x[np.nanargmax(form.f), 0] - 78.0) < 5.0
+    assert np.nanmax(form.low) > 0.02
 
 
 def test_few_runs_are_not_testable():

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from aqualog.core.notation import WHEELS
-from aqualog.core.records import FloatArray
-from aqualog.diagnose.campaign.expect import Driven, Response, respond
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.diagnose.campaign.compete import Option
+from aqualog.diagnose.campaign.expect import Driven, respond
 from aqualog.diagnose.campaign.noise import Fit
 from aqualog.diagnose.campaign.passes import CONTACT_MIN, LOST_MAX, RESISTANCE, Passes
-from aqualog.diagnose.campaign.refit import Refit
 from aqualog.diagnose.records import Manoeuvre
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import assemble
@@ -32,8 +33,7 @@ WAY = 130.0  # [m] of lane (thesis Fig. 2.25)
 _FRONT_AWAY = 1.0  # [m] of film that a front wheel leaves, where the rear wheels run beside its track: all of it
 
 
-@dataclass(frozen=True, slots=True)
-class _Run:
+class _Run(NamedTuple):
     """A run that could be driven; `beside`: the rear wheels beside the front ones' track."""
 
     name: str
@@ -44,34 +44,26 @@ class _Run:
     beside: bool = False
 
 
-def advice(passes: Passes, survivors: Sequence[Refit], scatter: Fit) -> Manoeuvre | None:
-    """Five runs of the catalogue that best distinguish the two most similar causes.
+def advice(passes: Passes, rivals: Sequence[Option], scatter: Fit) -> Manoeuvre | None:
+    """Five runs of the catalogue that best distinguish the two most likely sets.
 
-    None with fewer than two survivors. The answer is `none` where no run does.
+    None with fewer than two. The answer is `none` where no run does.
     """
-    if len(survivors) < 2:
+    if len(rivals) < 2:
         return None
-    first, second = survivors[0], survivors[1]
-    pair = ("+".join(sorted(first.keys)) or "none", "+".join(sorted(second.keys)) or "none")
-    now = max(second.cost - first.cost, 0.0)
+    first, second = rivals[:2]
+    pair = (first.refit.keys, second.refit.keys)
+    now = 2.0 * max(first.evidence - second.evidence, 0.0)
     runs = _catalogue(passes)
-    a, b = (_expected(runs, r.model, passes) for r in (first, second))
-    sigma, kappa = scatter.scatter
-    channels = [i for i, n in enumerate(passes.names) if not n.startswith("dry_")]
-    best, most = None, 0.0
-    for k, run in enumerate(runs):
-        usable = a.steady[k] and b.steady[k]
-        told = [j for j, c in enumerate(channels) if np.isfinite(a.values[k, j] - b.values[k, j])]
-        if not usable or not told:
-            continue
-        c = [channels[j] for j in told]
-        road = 2.0 * run.scenario.tyre_front.scatter_length / WAY
-        v = sigma[np.ix_(c, c)] + np.diag(kappa[c] * a.variances[k, told] * road)
-        d = a.values[k, told] - b.values[k, told]
-        energy = RUNS * float(d @ np.linalg.solve(v, d))
-        if energy > most:
-            best, most = run, energy
-    if best is None or now + most < 2.0 * now + 1.0:
+    (a, variances, usable), (b, _, usable_b) = (_expected(runs, o.refit.model, passes) for o in (first, second))
+    energy = np.zeros(len(runs))
+    for k in np.flatnonzero(usable & usable_b):
+        c = np.flatnonzero(np.isfinite(a[k] - b[k]))
+        road = 2.0 * runs[k].scenario.tyre_front.scatter_length / WAY
+        v = scatter.sigma[np.ix_(c, c)] + np.diag(scatter.kappa[c] * variances[k, c] * road)
+        energy[k] = RUNS * (a[k, c] - b[k, c]) @ np.linalg.solve(v, a[k, c] - b[k, c])
+    best, most = runs[int(np.argmax(energy))], float(energy.max())
+    if now + most < 2.0 * now + 1.0:
         sentence = f"No run of the catalogue distinguishes {pair[0]} from {pair[1]}."
         return Manoeuvre("none", (pair,), sentence, now, now + most, 0.0)
     sentence = f"Drive {RUNS} runs {best.words}: they would distinguish {pair[0]} from {pair[1]}"
@@ -110,16 +102,9 @@ def _catalogue(passes: Passes) -> list[_Run]:
     return out
 
 
-@dataclass(frozen=True, slots=True)
-class _Expected:
-    """(k, c) of the channels on the water, their variances along the lane, and whether a steady expectation holds."""
-
-    values: FloatArray
-    variances: FloatArray
-    steady: FloatArray
-
-
-def _expected(runs: Sequence[_Run], model: Model, passes: Passes) -> _Expected:
+def _expected(runs: Sequence[_Run], model: Model, passes: Passes) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Channels (k, c) on the water, NaN for the dry ones, their variances along the lane, and whether a steady
+    expectation holds."""
     setups = []
     for run in runs:
         setup = assemble(run.scenario, model)
@@ -127,26 +112,20 @@ def _expected(runs: Sequence[_Run], model: Model, passes: Passes) -> _Expected:
             setup = setup._replace(plant=setup.plant._replace(h_track=np.full(4, _FRONT_AWAY)))
         setups.append(setup)
     k = len(runs)
-    which = np.arange(k)
+    which, on, off = np.arange(k), np.ones(k, dtype=np.bool_), np.zeros(k, dtype=np.bool_)
     v, a = np.array([r.v for r in runs]), np.array([r.a for r in runs])
-    nothing = Driven(v, a, np.zeros((4, k)))
-    water = respond(setups, which, np.ones(k, dtype=np.bool_), nothing).resistance
-    dry = respond(setups, which, np.zeros(k, dtype=np.bool_), Driven(v, a, _traction(runs, np.zeros(k))))
-    wet = respond(setups, which, np.ones(k, dtype=np.bool_), Driven(v, a, _traction(runs, water)))
-    values, variances = [], []
-    for name in passes.names:
+    water = respond(setups, which, on, Driven(v, a, np.zeros((4, k)))).resistance
+    dry = respond(setups, which, off, Driven(v, a, _traction(runs, np.zeros(k))))
+    wet = respond(setups, which, on, Driven(v, a, _traction(runs, water)))
+    values, variances = np.full((2, k, len(passes.names)), np.nan)
+    for c, name in enumerate(passes.names):
         if name == RESISTANCE:
-            values.append(wet.resistance)
-            variances.append(wet.resistance_variance)
+            values[:, c], variances[:, c] = wet.resistance, wet.resistance_variance
         elif name.startswith("slip_slope_"):
             i = WHEELS.index(name[-2:])
-            values.append(wet.slip[i] - dry.slip[i])
-            variances.append(wet.slip_variance[i])
-    return _Expected(np.stack(values, axis=1), np.stack(variances, axis=1), _is_steady(wet))
-
-
-def _is_steady(wet: Response) -> FloatArray:
-    return np.asarray((wet.lost.max(axis=0) <= LOST_MAX) & (wet.contact.min(axis=0) >= CONTACT_MIN))
+            values[:, c], variances[:, c] = wet.slip[i] - dry.slip[i], wet.slip_variance[i]
+    usable = (wet.lost.max(axis=0) <= LOST_MAX) & (wet.contact.min(axis=0) >= CONTACT_MIN)
+    return values, variances, np.asarray(usable)
 
 
 def _traction(runs: Sequence[_Run], water: FloatArray) -> FloatArray:

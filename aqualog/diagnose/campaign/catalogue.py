@@ -1,67 +1,43 @@
-"""Effects that a campaign can show, as terms of the simulator, and the change of its runs by each."""
+"""Effects that a campaign can show, and the change of its runs by each."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.campaign.passes import Passes, expected_values
+from aqualog.diagnose.evidence import Evidence
+from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.model.effects import EFFECTS
-from aqualog.model.term import Effect, Model, Parameter, Term
+from aqualog.model.term import Model
 
-__all__ = ["Hypothesis", "Library", "hypotheses", "library", "model_with", "untested"]
+__all__ = ["Library", "hypotheses", "library", "untested"]
 
 STEP = 0.5  # standard deviations of the prior to either side, of a finite difference
 
 
-@dataclass(frozen=True, slots=True)
-class Hypothesis:
-    """An effect at a place."""
-
-    effect: Effect
-    where: str | None
-
-    @property
-    def key(self) -> str:
-        """`contact_loss@r`."""
-        return self.effect.name if self.where is None else f"{self.effect.name}@{self.where}"
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Its parameters."""
-        return self.effect.parameters
-
-    def goes_with(self, other: Hypothesis) -> bool:
-        """Whether both may be in one set; the whole car and one axle of the same effect would count the effect
-        twice."""
-        return self.effect is not other.effect or (self.where is not None and other.where is not None)
-
-
 class Library(NamedTuple):
-    """Hypotheses and `x` (g, c, k): change of the observations by one prior standard deviation of each parameter.
-
-    `columns` lists which of the k belong to each hypothesis; `base` (g, c) is the model's expectation, `road` its
-    variances.
+    """`evidence`: hypotheses with priors and bounds; `x` (g, c, k): change of the observations by one prior standard
+    deviation of each parameter, about a model whose expectation is `base` (g, c), with the road's variances `road`.
     """
 
-    hypotheses: tuple[Hypothesis, ...]
+    evidence: Evidence
     x: FloatArray
-    columns: tuple[tuple[int, ...], ...]
     base: FloatArray
     road: FloatArray
 
 
 def hypotheses(passes: Passes) -> tuple[Hypothesis, ...]:
-    """Hypotheses that these runs can test: stiffness of the driven axles, load only where it differs."""
+    """Hypotheses that these runs can test: stiffness of the driven axles only."""
     driven = {n[-2] for n in passes.names if n.startswith("slip_slope_")}
     searches = sorted(((e.campaign, e) for e in EFFECTS.values() if e.campaign is not None), key=lambda x: x[0].order)
     return tuple(
-        Hypothesis(e, where) for asked, e in searches for where in asked.places if not asked.driven or where in driven
-    )
+        Hypothesis(e, where, tuple(p.name for p in e.parameters))
+        for asked, e in searches for where in asked.places if not asked.driven or where in driven
+    )  # fmt: skip
 
 
 def untested(tested: Sequence[Hypothesis]) -> dict[str, str]:
@@ -71,38 +47,33 @@ def untested(tested: Sequence[Hypothesis]) -> dict[str, str]:
     return {name: reason for name in EFFECTS if name not in names}
 
 
-def model_with(base: Model, chosen: Sequence[Hypothesis], values: Sequence[Mapping[str, float]]) -> Model:
-    """The base model and terms of the chosen hypotheses."""
-    for h, v in zip(chosen, values, strict=True):
-        base = base.with_term(Term(h.effect, dict(v), h.where))
-    return base
+def library(passes: Passes, model: Model, asked: Sequence[Hypothesis], given: Model) -> Library:
+    """Change of the observations by each hypothesis about a model, from differences of the expectation.
 
-
-def library(passes: Passes, base: Model, tested: Sequence[Hypothesis]) -> Library:
-    """Change of the observations by each effect, from differences of the model's expectation with the term in it.
-
-    Parameters
-    ----------
-    passes : Passes
-    base : Model
-        Terms that are assumed to be right.
-    tested : sequence of Hypothesis
+    `given`: the model at hand, from whose values bounds count.
     """
-    expected, road = expected_values(passes, base)
+    expected, road = expected_values(passes, model)
     columns: list[FloatArray] = []
-    places: list[tuple[int, ...]] = []
-    for h in tested:
-        first = len(columns)
-        for p in h.parameters:
-            ends = [min(max(p.neutral + s * STEP * p.sigma, p.low), p.high) for s in (-1.0, 1.0)]
+    places, parameters = [], []
+    for h in asked:
+        places.append(tuple(range(len(columns), len(columns) + len(h.free))))
+        for n in h.free:
+            p, at = h.parameter(n), value_in(model, h, n)
+            ends = [min(max(at + s * STEP * p.sigma, p.low), p.high) for s in (-1.0, 1.0)]
             low, high = (
-                expected if x == p.neutral else expected_values(passes, model_with(base, [h], [{p.name: x}]))[0]
-                for x in ends
-            )  # fmt: skip
+                expected if x == at else expected_values(passes, with_values(model, [(h, {n: x})]))[0] for x in ends
+            )
             columns.append((high - low) * (p.sigma / (ends[1] - ends[0])))
-        places.append(tuple(range(first, len(columns))))
-    x = np.stack(columns, axis=-1) if columns else np.zeros((*expected.shape, 0))
-    return Library(tuple(tested), np.nan_to_num(x), tuple(places), expected, road * _points_of_road(passes))
+            parameters.append((p, value_in(given, h, n)))
+    sigma, low, high = (
+        np.array(x) for x in zip(*((p.sigma, p.low - now, p.high - now) for p, now in parameters), strict=True)
+    )
+    none = np.zeros(sigma.size)
+    evidence = Evidence(
+        (), tuple(asked), (), (), tuple(places), sigma, low, high, np.array([p.smallest for p, _ in parameters]),
+        none, np.zeros(len(asked), dtype=bool), none, tuple("" for _ in sigma), none,
+    )  # fmt: skip
+    return Library(evidence, np.nan_to_num(np.stack(columns, axis=-1)), expected, road * _points_of_road(passes))
 
 
 def _points_of_road(passes: Passes) -> FloatArray:

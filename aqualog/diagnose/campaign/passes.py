@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aqualog.campaign.results import RunInfo
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.diagnose.campaign.expect import Driven, respond
+from aqualog.diagnose.campaign.expect import Driven, Response, respond
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model
@@ -27,18 +27,15 @@ CONTACT_MIN = 0.3  # [-] of any wheel; below, the passage to full aquaplaning is
 
 
 class Question(NamedTuple):
-    """Samples (n,) of all runs, evaluated in one call of the model, each with its `run`, scenario (`which`) and
-    `wet`."""
+    """Samples (n,) of all runs, evaluated in one call of the model, each with its `run` and `wet`."""
 
-    scenarios: tuple[Scenario, ...]
     run: NDArray[np.int64]
-    which: NDArray[np.int64]
     wet: BoolArray
     driven: Driven
 
 
 class Told(NamedTuple):
-    """Inputs of a run for the expectation: configuration (equal ones share a plant) and driving state."""
+    """Inputs of a run for the expectation: configuration and driving state."""
 
     scenario: Scenario
     wet: Driven | None
@@ -66,16 +63,6 @@ class Passes:
     left_out: Mapping[str, int]
     question: Question
 
-    def part(self, which: Sequence[int]) -> Passes:
-        """Some of the runs."""
-        at = np.asarray(which, dtype=np.int64)
-        told = tuple(self.told[i] for i in at)
-        return replace(
-            self, values=self.values[at], told=told, question=question_of(told),
-            infos=tuple(self.infos[i] for i in at), coordinates={k: x[at] for k, x in self.coordinates.items()},
-            nuisances=self.nuisances[at], seconds=self.seconds[at],
-        )  # fmt: skip
-
 
 def channels_of(wheels: Sequence[str]) -> tuple[str, ...]:
     """Names of the columns."""
@@ -84,25 +71,11 @@ def channels_of(wheels: Sequence[str]) -> tuple[str, ...]:
 
 def question_of(told: Sequence[Told]) -> Question:
     """All samples of the runs together, so that one call of the model evaluates them."""
-    scenarios: dict[str, int] = {}
-    kept: list[Scenario] = []
-    run, which, wet, parts = [], [], [], []
-    for r, t in enumerate(told):
-        key = repr(t.scenario)
-        if key not in scenarios:
-            scenarios[key] = len(kept)
-            kept.append(t.scenario)
-        for is_wet, driven in ((False, t.dry), (True, t.wet)):
-            if driven is not None:
-                run.append(np.full(driven.v.size, r))
-                which.append(np.full(driven.v.size, scenarios[key]))
-                wet.append(np.full(driven.v.size, is_wet))
-                parts.append(driven)
-    if not parts:
-        none = np.zeros(0, dtype=np.int64)
-        return Question((), none, none, none.astype(bool), Driven(np.zeros(0), np.zeros(0), np.zeros((4, 0))))
-    joined = Driven(*(np.concatenate(x, axis=-1) for x in zip(*parts, strict=True)))
-    return Question(tuple(kept), np.concatenate(run), np.concatenate(which), np.concatenate(wet), joined)
+    parts = [(r, w, d) for r, t in enumerate(told) for w, d in ((False, t.dry), (True, t.wet)) if d is not None]
+    parts = parts or [(0, False, Driven(np.zeros(0), np.zeros(0), np.zeros((4, 0))))]
+    sizes = [d.v.size for _, _, d in parts]
+    joined = Driven(*(np.concatenate(x, axis=-1) for x in zip(*(d for _, _, d in parts), strict=True)))
+    return Question(np.repeat([r for r, _, _ in parts], sizes), np.repeat([w for _, w, _ in parts], sizes), joined)
 
 
 def doubted(passes: Passes, base: Model) -> Passes:
@@ -121,27 +94,33 @@ def doubted(passes: Passes, base: Model) -> Passes:
     return replace(passes, nuisances=np.concatenate([columns, passes.nuisances], axis=-1))
 
 
-def steady(passes: Passes, model: Model) -> list[int]:
-    """Runs in which every wheel keeps enough contact by a model for its steady expectation to hold, by index."""
-    q = passes.question
-    found = respond([assemble(s, model) for s in q.scenarios], q.which, q.wet, q.driven)
+def _responses(passes: Passes, model: Model, friction: float = 1.0) -> Response:
+    q, setups = passes.question, [assemble(t.scenario, model) for t in passes.told]
+    setups = [s._replace(plant=s.plant._replace(mu=friction * s.plant.mu)) for s in setups]
+    return respond(setups, q.run, q.wet, q.driven)
+
+
+def steady(passes: Passes, model: Model) -> Passes:
+    """Runs without values where a wheel keeps too little contact by a model for its steady expectation to hold."""
+    q, found = passes.question, _responses(passes, model)
     lost, contact = found.lost.max(axis=0), found.contact.min(axis=0)
-    out = []
-    for r in range(len(passes.told)):
+    floats = np.zeros(len(passes.told), dtype=np.bool_)
+    for r in np.unique(q.run[q.wet]):
         here = (q.run == r) & q.wet
-        if not here.any() or (lost[here].mean() <= LOST_MAX and contact[here].mean() >= CONTACT_MIN):
-            out.append(r)
-    return out
+        floats[r] = lost[here].mean() > LOST_MAX or contact[here].mean() < CONTACT_MIN
+    if not floats.any():
+        return passes
+    return replace(
+        passes, values=np.where(floats[:, None], np.nan, passes.values), seconds=np.where(floats, 0.0, passes.seconds),
+        left_out={**passes.left_out, "a wheel floats in the model that was found": int(floats.sum())},
+    )  # fmt: skip
 
 
 def expected_values(passes: Passes, model: Model, *, friction: float = 1.0) -> tuple[FloatArray, FloatArray]:
     """Expected observations of a model (g, c), and the variances (g, c) of one point by the road's fluctuation.
     `friction`: factor on that of all wheels.
     """
-    q = passes.question
-    setups = [assemble(s, model) for s in q.scenarios]
-    setups = [s._replace(plant=s.plant._replace(mu=friction * s.plant.mu)) for s in setups]
-    found = respond(setups, q.which, q.wet, q.driven)
+    q, found = passes.question, _responses(passes, model, friction)
     values, variances = np.full((2, *passes.values.shape), np.nan)
     g = len(passes.told)
 

@@ -2,192 +2,165 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aqualog.core.intervals import student_quantile
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.campaign.catalogue import Hypothesis, model_with
-from aqualog.diagnose.campaign.noise import inverse_of, prior_of
+from aqualog.diagnose.campaign.noise import inner, inverse_of, prior_of
 from aqualog.diagnose.campaign.passes import Passes, expected_values
-from aqualog.model.term import Model, Parameter
+from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
+from aqualog.diagnose.records import Estimate
+from aqualog.diagnose.refit import PRIOR_WIDTH
+from aqualog.model.term import Model
 
-__all__ = ["Refit", "conditioned", "intervals", "refit", "weighed"]
+__all__ = ["Refit", "estimates", "refit", "settled"]
 
 ROUNDS = 6
 STEP = 0.1  # prior standard deviations, of a finite difference
-DONE = 0.02  # standard errors
+DONE = 0.1  # standard errors
 EDGE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Refit:
-    """A set of effects at its best.
+    """A set at its best values.
 
-    `values` of each hypothesis; `residual` (g, c); `x` (g, c, k) change by one prior standard deviation, at the
-    optimum; `theta` (k,) distance from neutral in those; `cost`: weighted square of the residual with the nuisances at
-    their best; `information` (k, k), the nuisances taken out; `is_physical`: no value at a bound; `odds`: log odds
-    against so many effects; `log_evidence`.
+    `theta` (k,): their distance from the model at hand in prior standard deviations; `x` (g, c, k): change of the
+    observations by one of those there; `residual` (g, c); `at_bound` if a value sits at its physical bound.
     """
 
-    chosen: tuple[Hypothesis, ...]
-    values: tuple[Mapping[str, float], ...]
+    members: tuple[Hypothesis, ...]
+    theta: FloatArray
     model: Model
     residual: FloatArray
     x: FloatArray
-    theta: FloatArray
-    cost: float
-    information: FloatArray
-    is_physical: bool
-    odds: float
-    log_evidence: float
+    at_bound: bool
 
     @property
-    def keys(self) -> frozenset[str]:
-        """Names with places."""
-        return frozenset(h.key for h in self.chosen)
+    def at_start(self) -> FloatArray:
+        """Residual (g, c) that a linear model about these values would have had without the set."""
+        return np.asarray(self.residual + self.x @ self.theta)
 
     @property
-    def parameters(self) -> tuple[tuple[Hypothesis, Parameter], ...]:
-        """All its parameters in the order of the columns."""
-        return tuple((h, p) for h in self.chosen for p in h.parameters)
-
-
-def conditioned(
-    x: FloatArray, y: FloatArray, nuisances: FloatArray, weight: FloatArray
-) -> tuple[FloatArray, FloatArray, float]:
-    """Information (k, k), score (k,), cost of columns `x` (g, c, k) about `y` (g, c), sizes of the nuisances free."""
-    both = np.concatenate([nuisances, x], axis=-1)
-    both = np.where(np.isfinite(y)[:, :, None], both, 0.0)
-    y = np.nan_to_num(y)
-    wb = (weight @ both).reshape(y.size, -1)
-    a, b = both.reshape(y.size, -1).T @ wb, y.ravel() @ wb
-    cost = float(y.ravel() @ (weight @ y[:, :, None]).ravel())
-    n = nuisances.shape[-1]
-    a += np.diag(np.append(prior_of(n, 0), np.zeros(x.shape[-1])))
-    inverse = inverse_of(a[:n, :n])
-    across = a[n:, :n] @ inverse
-    return a[n:, n:] - across @ a[:n, n:], b[n:] - across @ b[:n], cost - float(b[:n] @ inverse @ b[:n])
+    def keys(self) -> str:
+        """`contact_loss@f+water_drag`."""
+        return "+".join(sorted(h.key for h in self.members)) or "none"
 
 
 def refit(
-    passes: Passes,
-    base: Model,
-    chosen: Sequence[Hypothesis],
-    weight: FloatArray,
-    *,
-    per_effect: float,
-    start: Mapping[str, Mapping[str, float]] | None = None,
-    rounds: int = ROUNDS,
+    passes: Passes, given: Model, members: Sequence[Hypothesis], start: FloatArray, x: FloatArray, weight: FloatArray
 ) -> Refit:
     """Fit a set by Gauss-Newton with the prior of each parameter, within its physical bounds.
 
     Parameters
     ----------
-    passes, base
-    chosen : sequence of Hypothesis
+    passes : Passes
+    given : Model
+        On which the set comes.
+    members : sequence of Hypothesis
         Empty for the model as it is.
+    start : array (k,)
+        In prior standard deviations.
+    x : array (g, c, k)
+        Change of the observations by one of those near the start.
     weight : array (g, c, c)
         Precision of each run.
-    per_effect : float
-        Odds against one more effect.
-    start : mapping, optional
-        Values to begin at, by key.
     """
-    chosen = tuple(chosen)
-    told = [(h, p) for h in chosen for p in h.parameters]
-    sigma, neutral = (np.array([getattr(p, n) for _, p in told]) for n in ("sigma", "neutral"))
-    low, high = (np.array([(getattr(p, n) - p.neutral) / p.sigma for _, p in told]) for n in ("low", "high"))
-    theta = np.array([((start or {}).get(h.key, {}).get(p.name, p.neutral) - p.neutral) / p.sigma for h, p in told])
+    names = [(h, n) for h in members for n in h.free]
+    told = [h.parameter(n) for h, n in names]
+    now = np.array([value_in(given, h, n) for h, n in names])
+    sigma, low, high = (np.array([getattr(p, a) for p in told]) for a in ("sigma", "low", "high"))
+    low, high = (low - now) / sigma, (high - now) / sigma
 
-    def values_of(t: FloatArray) -> tuple[dict[str, float], ...]:
+    def at(t: FloatArray) -> tuple[Model, FloatArray]:
         # a bound in units of sigma comes back with a rounding error beyond it
-        flat = [min(max(n + s * z, p.low), p.high) for n, s, z, (_, p) in zip(neutral, sigma, t, told, strict=True)]
-        return tuple({p.name: flat[i] for i, (h, p) in enumerate(told) if h is c} for c in chosen)
-
-    def left(t: FloatArray) -> FloatArray:
-        expected: FloatArray = expected_values(passes, model_with(base, chosen, values_of(t)))[0]
-        return passes.values - expected
+        flat = [min(max(x, p.low), p.high) for x, p in zip((now + sigma * t).tolist(), told, strict=True)]
+        own = [(h, {n: v for (o, n), v in zip(names, flat, strict=True) if o is h}) for h in members]
+        model = with_values(given, own)
+        return model, passes.values - expected_values(passes, model)[0]
 
     def loss(e: FloatArray, t: FloatArray) -> float:
-        return conditioned(nothing, e, passes.nuisances, weight)[2] + float(t @ t)
+        return float(inner(np.zeros((*e.shape, 0)), e, passes.nuisances, weight)[0, 0] + t @ t / PRIOR_WIDTH**2)
 
-    nothing = np.zeros((*passes.values.shape, 0))
-    e = left(theta)
-    now = loss(e, theta)
-    x = np.zeros((*e.shape, theta.size))
-    information = np.zeros((theta.size, theta.size))
-    for _ in range(rounds if theta.size else 0):
-        for k in range(theta.size):
-            step = STEP if theta[k] + STEP <= high[k] else -STEP
-            moved = theta.copy()
-            moved[k] += step
-            x[:, :, k] = np.nan_to_num((e - left(moved)) / step)
-        information, score, _ = conditioned(x, e, passes.nuisances, weight)
-        full = information + np.eye(theta.size)
-        way = np.linalg.solve(full, score - theta)
-        share = 1.0
-        for _ in range(4):
+    def slopes(e: FloatArray, t: FloatArray) -> FloatArray:
+        x = np.zeros((*e.shape, t.size))
+        for k in range(t.size):
+            step = STEP if t[k] + STEP <= high[k] else -STEP
+            x[:, :, k] = np.nan_to_num((e - at(t + step * np.eye(t.size)[k])[1]) / step)
+        return x
+
+    theta = np.clip(start, low, high)
+    model, e = at(theta)
+    least, fresh = loss(e, theta), False
+    for _ in range(ROUNDS if theta.size else 0):
+        A = inner(x, e, passes.nuisances, weight)
+        full = A[:-1, :-1] + np.eye(theta.size) / PRIOR_WIDTH**2
+        way = np.linalg.solve(full, A[:-1, -1] - theta / PRIOR_WIDTH**2)
+        for share in (1.0, 0.4, 0.16, 0.064):
             there = np.clip(theta + share * way, low, high)
-            e_there = left(there)
-            then = loss(e_there, there)
-            if then <= now:
+            new, e_there = at(there)
+            if loss(e_there, there) <= least:
                 break
-            share *= 0.4
         else:
+            if fresh:
+                break
+            x, fresh = slopes(e, theta), True
+            continue
+        moved = there - theta
+        theta, model, e, least = there, new, e_there, loss(e_there, there)
+        if float(moved @ full @ moved) < DONE**2:
             break
-        moved_by = there - theta
-        theta, e, now = there, e_there, then
-        if float(moved_by @ full @ moved_by) < DONE**2:
-            break
-    inside = bool(np.all((theta > low + EDGE) & (theta < high - EDGE) | (np.abs(theta) < EDGE)))
-    odds = len(chosen) * math.log(per_effect)
-    evidence = -0.5 * now - 0.5 * np.linalg.slogdet(np.eye(theta.size) + information)[1] - odds
-    values = values_of(theta)
-    return Refit(
-        chosen, values, model_with(base, chosen, values), e, x, theta, now - float(theta @ theta), information, inside,
-        odds, float(evidence),
-    )  # fmt: skip
+        x, fresh = slopes(e, theta), True
+    at_bound = bool(np.any(((theta <= low + EDGE) | (theta >= high - EDGE)) & (np.abs(theta) >= EDGE)))
+    return Refit(tuple(members), theta, model, e, x, at_bound)
 
 
-def weighed(found: Refit, passes: Passes, weight: FloatArray) -> Refit:
-    """The same fit judged with other weights: its evidence, information and cost; the sizes stay."""
-    information, _, cost = conditioned(found.x, found.residual, passes.nuisances, weight)
-    k = found.theta.size
-    evidence = -0.5 * (cost + float(found.theta @ found.theta)) - 0.5 * np.linalg.slogdet(np.eye(k) + information)[1]
-    evidence -= found.odds
-    return replace(found, cost=cost, information=information, log_evidence=float(evidence))
+def settled(found: Refit, passes: Passes, weight: FloatArray, by: NDArray[np.int64] | None = None) -> FloatArray:
+    """Residual (g, c) with the free sizes (radii, delay) and the set's values at their best on the runs `by`."""
+    x, _, size = _solved(found, passes, weight, np.arange(len(found.residual)) if by is None else by)
+    return np.asarray(found.residual - x @ size)
 
 
-def intervals(found: Refit, passes: Passes, weight: FloatArray) -> list[tuple[float, float, float]]:
-    """Value and ends of the 95 % interval of each parameter, by the scores of the runs.
+def _solved(
+    found: Refit, passes: Passes, weight: FloatArray, by: NDArray[np.int64]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """All columns (g, c, k), covariance (k, k) and sizes (k,) beside the set's values, by some of the runs."""
+    k, free = found.theta.size, passes.nuisances.shape[-1]
+    x = np.concatenate([passes.nuisances, found.x], axis=-1)
+    prior = np.append(prior_of(free), np.full(k, PRIOR_WIDTH**-2.0))
+    y = found.residual[by]
+    own = np.where(np.isfinite(y)[:, :, None], x[by], 0.0)
+    wx = weight[by] @ own
+    covariance = inverse_of(np.einsum("rck,rcl->kl", own, wx) + np.diag(prior))
+    pull = prior * np.append(np.zeros(free), -found.theta)
+    return x, covariance, covariance @ (np.einsum("rck,rc->k", wx, np.nan_to_num(y)) + pull)
+
+
+def estimates(found: Refit, passes: Passes, weight: FloatArray) -> list[Estimate]:
+    """Value and 95 % interval of each parameter, by the scores of the runs.
 
     Cluster-robust variance with one run as the unit (each run's residual blown up by its own leverage), at least that
     of the model; Student's t with the runs less the sizes that were fitted.
     """
+    known = np.isfinite(found.residual)
+    x, covariance, size = _solved(found, passes, weight, np.arange(len(known)))
+    x = np.where(known[:, :, None], x, 0.0)
+    e, wx = np.nan_to_num(found.residual) - x @ size, weight @ x
+    hat = np.einsum("rck,kl,rdl->rcd", x, covariance, wx)
+    grown = np.linalg.solve(np.eye(e.shape[1]) - np.clip(hat, -0.95, 0.95), e[:, :, None])
+    scores = (wx.transpose(0, 2, 1) @ grown)[:, :, 0]
+    robust = covariance @ (scores.T @ scores) @ covariance
     k = found.theta.size
-    n = passes.nuisances.shape[-1]
-    both = np.concatenate([passes.nuisances, found.x], axis=-1)
-    both = np.where(np.isfinite(found.residual)[:, :, None], both, 0.0)
-    wb = np.einsum("rcd,rdk->rck", weight, both)
-    a = np.einsum("rck,rcl->kl", both, wb)
-    inverse = inverse_of(a + np.diag(np.append(prior_of(n, 0), np.zeros(k))))
-    y = np.nan_to_num(found.residual)
-    e = y - np.einsum("rck,k->rc", both, inverse @ np.einsum("rck,rc->k", wb, y))
-    hat = np.einsum("rck,kl,rdl->rcd", both, inverse, wb)
-    c = e.shape[1]
-    grown = np.linalg.solve(np.eye(c) - np.clip(hat, -0.95, 0.95), e[:, :, None])[:, :, 0]
-    scores = np.einsum("rck,rc->rk", wb, grown)
-    robust = inverse @ (scores.T @ scores) @ inverse
-    runs = int(np.isfinite(found.residual).any(axis=1).sum())
-    wide = student_quantile(0.975, max(runs - k - 2, 1))
+    wide = student_quantile(0.975, max(int(known.any(axis=1).sum()) - k - 2, 1))
+    sd = np.sqrt(np.maximum(np.diag(robust), np.diag(covariance)))[size.size - k :]
     out = []
-    for i, (_, p) in enumerate(found.parameters):
-        variance = max(float(robust[n + i, n + i]), float(inverse[n + i, n + i]))
-        value = p.neutral + p.sigma * float(found.theta[i])
-        half = wide * p.sigma * math.sqrt(max(variance, 0.0))
-        out.append((value, value - half, value + half))
+    names = [(h, n) for h in found.members for n in h.free]
+    for (h, name), s in zip(names, sd.tolist(), strict=True):
+        p = h.parameter(name)
+        value, half = value_in(found.model, h, name), wide * p.sigma * s
+        out.append(Estimate(value, value - half, value + half, p.unit))
     return out

@@ -1,0 +1,200 @@
+"""Known effects and unknown forms of a campaign in one competition about its best set; the best sets are refitted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.core.records import FloatArray
+from aqualog.diagnose.any_effect import Calibration, calibrate, significance
+from aqualog.diagnose.arena import blocks_of
+from aqualog.diagnose.campaign.catalogue import Library, library
+from aqualog.diagnose.campaign.forms import explained, shapes_of
+from aqualog.diagnose.campaign.noise import Fit, fit, inner
+from aqualog.diagnose.campaign.passes import Passes
+from aqualog.diagnose.campaign.refit import Refit, refit
+from aqualog.diagnose.compete import rule
+from aqualog.diagnose.competition import COARSE, Block, added, start
+from aqualog.diagnose.evidence import Evidence
+from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.diagnose.records import Remainder, Significance
+from aqualog.diagnose.sets import Members, Sets, fitted_in, ranked, searched
+from aqualog.diagnose.shapes import Shape
+from aqualog.diagnose.unexplained import clear_forms, described
+from aqualog.model.term import Model
+
+__all__ = ["Found", "Option", "compete"]
+
+ROUNDS = 3  # of the competition around its own best set
+COVERED, REFITTED = 0.999, 10  # share of the posterior that is refitted, and the most sets
+
+
+class Option(NamedTuple):
+    """A refitted set and its log evidence with its prior. [nats (natural logarithm)]"""
+
+    refit: Refit
+    evidence: float
+
+
+class Found(NamedTuple):
+    """`gram` of the effects and `calibration` describe what the runs can distinguish; `nothing`: the model at hand.
+
+    `options`: sets, most likely first; none where there are unknown `forms`, or the test finds no more than chance.
+    """
+
+    evidence: Evidence
+    significance: Significance
+    gram: FloatArray
+    calibration: Calibration
+    scatter: Fit
+    nothing: Refit
+    forms: tuple[Remainder, ...]
+    options: tuple[Option, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Ring:
+    """What competes in these runs; `functions` (g, c, K): columns of the shapes, after those of the effects."""
+
+    passes: Passes
+    given: Model
+    evidence: Evidence
+    blocks: tuple[Block, ...]
+    sd: FloatArray
+    shapes: tuple[Shape, ...]
+    functions: FloatArray
+
+    def name(self, block: int) -> str:
+        b = self.blocks[block]
+        return (
+            self.evidence.asked[b.tag].effect.name if b.kind == "effect" else f"{self.shapes[b.tag].mechanism.name}()"
+        )
+
+    @property
+    def known(self) -> tuple[Block, ...]:
+        return tuple(b for b in self.blocks if b.kind == "effect")
+
+    def sets(self, blocks: Sequence[Block], gram: FloatArray) -> Sets:
+        found = searched(blocks, gram, rule(self.evidence, blocks, gram))
+        return ranked({m: COARSE * e for m, e in found.items()}, self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class _Stand:
+    """The runs about a refitted set: signatures there, and the scatter with all effects free."""
+
+    best: Refit
+    lib: Library
+    y: FloatArray  # (g, c) residual that a linear model about the set has without it
+    scatter: Fit
+
+    def gram(self, passes: Passes, *more: FloatArray) -> FloatArray:
+        return inner(np.concatenate([self.lib.x, *more], axis=-1), self.y, passes.nuisances, self.scatter.weight)
+
+
+def compete(
+    passes: Passes, given: Model, asked: tuple[Hypothesis, ...], *, level: float, surrogates: int, seed: int,
+    say: Callable[[str], None] = lambda what: None,
+) -> Found:  # fmt: skip
+    """Unknown forms and sets of known effects with their evidence.
+
+    Signatures are straight lines, effects are not: so unknown forms compete with signatures about the best set of
+    effects, and effects are asked for only if the test for any effect finds more than chance at this `level`.
+    """
+    say("signatures of the effects")
+    lib = library(passes, given, asked, given)
+    shapes, functions = shapes_of(passes)
+    ring = _Ring(passes, given, lib.evidence, *blocks_of(lib.evidence, shapes), shapes, functions)
+    y = passes.values - lib.base
+    nothing = Refit((), np.zeros(0), given, y, np.zeros((*y.shape, 0)), at_bound=False)
+    stand = _Stand(nothing, lib, y, fit(y, lib.x, lib.road, passes.nuisances))
+    gram = stand.gram(passes)
+    plain = gram / np.outer(scale := np.append(lib.evidence.prior, 1.0), scale)
+    calibration = calibrate(lib.evidence, plain, surrogates=surrogates, level=level, seed=seed)
+    test = significance(lib.evidence, plain, calibration, level)
+    if test.p_value <= level:
+        say("known effects")
+        stand = _repeated(ring, stand)
+    say("known effects against unknown forms")
+    forms, stand = _forms(ring, stand, seed)
+    options: tuple[Option, ...] = ()
+    if not forms and test.p_value <= level:
+        say("refitting the sets of effects")
+        options = _options(ring, stand, nothing)
+    return Found(lib.evidence, test, plain, calibration, stand.scatter, nothing, forms, options)
+
+
+def _refitted(ring: _Ring, stand: _Stand, members: Members, gram: FloatArray) -> Refit:
+    linear = fitted_in(ring.known, gram, members)
+    own = [ring.evidence.asked[m] for m in members]
+    x = stand.lib.x[:, :, linear.columns]
+    return refit(ring.passes, ring.given, own, linear.mean, x, stand.scatter.weight)
+
+
+def _repeated(ring: _Ring, stand: _Stand) -> _Stand:
+    """The competition of known effects around its own best set, until that stays the same."""
+    done: Members = ()
+    for _ in range(ROUNDS):
+        gram = stand.gram(ring.passes)
+        best = ring.sets(ring.known, gram).best
+        if best == done:
+            break
+        found = _refitted(ring, stand, best, gram)
+        lib = library(ring.passes, found.model, ring.evidence.asked, ring.given)
+        own = [c for m in best for c in ring.known[m].columns]
+        scatter = fit(found.residual, lib.x, lib.road, ring.passes.nuisances, stand.scatter)
+        stand, done = _Stand(found, lib, found.residual + lib.x[:, :, own] @ found.theta, scatter), best
+    return stand
+
+
+def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...], _Stand]:
+    """Unknown forms that no known effect replaces; the scatter is that with the forms of the best set free too."""
+    passes, k = ring.passes, stand.lib.evidence.count
+    after: Members = ()
+    for _ in range(ROUNDS):
+        gram = stand.gram(passes, ring.functions)
+        sets = ring.sets(ring.blocks, gram)
+        new = tuple(m for m in sets.best if ring.blocks[m].kind == "shape")
+        if new == after:
+            break
+        after = new
+        drawn = [
+            ring.functions[:, :, [c - k for c in b.columns]] @ np.linalg.cholesky(b.prior)
+            for b in (ring.blocks[m] for m in new)
+        ]
+        x = np.concatenate([stand.lib.x, *drawn], axis=-1)
+        wider = fit(stand.best.residual, x, stand.lib.road, passes.nuisances, stand.scatter)
+        stand = replace(stand, scatter=wider)
+    out = []
+    linear = fitted_in(ring.blocks, gram, sets.best)
+    for c in clear_forms(ring, sets, gram):
+        own = [i for m in c.own for i in ring.blocks[m].columns]
+        form = ring.functions[:, :, [i - k for i in own]] @ linear.mean[[linear.columns.index(i) for i in own]]
+        name = ring.shapes[ring.blocks[c.first].tag].mechanism.name
+        out.append(described(ring, sets, gram, linear, c, name, explained(passes, name, stand.y, form), seed))
+    return tuple(out), stand
+
+
+def _options(ring: _Ring, stand: _Stand, nothing: Refit) -> tuple[Option, ...]:
+    """The sets that hold most of the posterior, refitted, with the evidence about their own values."""
+    gram = stand.gram(ring.passes)
+    sets = ring.sets(ring.known, gram)
+    enough = 1 + int(np.searchsorted(np.cumsum(sets.probability), COVERED))
+    chosen = [members for members, _ in sets.sets[: min(enough, REFITTED)] if members]
+    refits = [(members, _refitted(ring, stand, members, gram)) for members in chosen]
+    out = [Option(r, _evidence(ring, stand, r, members)) for members, r in [((), nothing), *refits] if not r.at_bound]
+    return tuple(sorted(out, key=lambda o: -o.evidence))
+
+
+def _evidence(ring: _Ring, stand: _Stand, found: Refit, members: Members) -> float:
+    """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values."""
+    state = start(inner(found.x, found.at_start, ring.passes.nuisances, stand.scatter.weight))
+    cost, at = float(state.inner[-1, -1]), 0
+    for m in members:
+        b = ring.known[m]
+        state = added(state, m, replace(b, columns=tuple(range(at, at + len(b.columns)))))
+        at += len(b.columns)
+    return state.evidence - 0.5 * cost

@@ -1,0 +1,187 @@
+"""Sets of blocks by their evidence: a search with swaps on inner products, and the posterior over what it visits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Container, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aqualog.core.records import FloatArray
+from aqualog.diagnose.competition import SCALES, Block, State, added, scored, start, values
+
+__all__ = [
+    "Fitted", "Grouped", "MayJoin", "Members", "Sets", "evidence_of", "first_of", "fitted_in", "grouped", "ranked",
+    "searched", "shares",
+]  # fmt: skip
+
+WIDTH = 8  # sets that are carried on
+MOST = 4  # blocks in one set
+SWAPPED = 3  # sets in which every member is exchanged
+FEW = 4  # first candidates
+DIES = 6.0  # [nats] behind the best set, at which a level of larger sets ends the search
+SINGULAR = 1e-3  # share of a column's energy that the others of its set must leave
+SMALLEST = 1e-12
+BEYOND = 2.0  # standard deviations by which a value may be beyond a physical bound
+
+Members = tuple[int, ...]
+MayJoin = Callable[[State, Block], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Sets:
+    """`sets` by evidence with their prior, best first, and `probability` of each."""
+
+    sets: tuple[tuple[Members, float], ...]
+    probability: FloatArray
+    marginal: Mapping[str, float]  # by name of effect or mechanism
+    blocks: Mapping[int, float]  # by block
+
+    @property
+    def best(self) -> Members:
+        """The most probable set."""
+        return self.sets[0][0]
+
+
+@dataclass(frozen=True, slots=True)
+class Fitted:
+    """A set's `columns`, posterior `mean` (k,) and `covariance` (k, k) in scaled values."""
+
+    columns: list[int]
+    mean: FloatArray
+    covariance: FloatArray
+
+
+@dataclass(frozen=True, slots=True)
+class Grouped:
+    """Sets (indices) with the same names together, the most probable first, and the share of each name."""
+
+    groups: tuple[tuple[int, ...], ...]
+    marginal: Mapping[str, float]
+
+
+def fitted_in(blocks: Sequence[Block], inner: FloatArray, members: Sequence[int]) -> Fitted:
+    """Values of all columns of a set together, from inner products (K + 1, K + 1) whose last row is the residual."""
+    state = start(inner)
+    scales = []
+    for m in members:
+        scales.append(scored(state, blocks[m])[1])
+        state = added(state, m, blocks[m])
+    return Fitted(*values(inner, [blocks[m] for m in members], scales))
+
+
+def evidence_of(blocks: Sequence[Block], inner: FloatArray, members: Sequence[int]) -> float:
+    """Log of the marginal likelihood that a set gains, without its prior. [nats (natural logarithm)]"""
+    state, total = start(inner), 0.0
+    for m in members:
+        total += scored(state, blocks[m])[0]
+        state = added(state, m, blocks[m])
+    return total
+
+
+def ranked(sets: Mapping[Members, float], name: Callable[[int], str]) -> Sets:
+    """The posterior over sets from their evidence; `name` of a block, by which probabilities add up."""
+    order = tuple(sorted(sets.items(), key=lambda x: -x[1]))
+    p = shares([e for _, e in order])
+    by_name: dict[str, float] = {}
+    by_block: dict[int, float] = {}
+    for (members, _), q in zip(order, p.tolist(), strict=True):
+        for n in {name(m) for m in members}:
+            by_name[n] = by_name.get(n, 0.0) + q
+        for m in members:
+            by_block[m] = by_block.get(m, 0.0) + q
+    return Sets(order, p, by_name, by_block)
+
+
+def shares(evidence: Sequence[float]) -> FloatArray:
+    """Probabilities of sets from their log evidence."""
+    z = np.array(evidence)
+    p = np.exp(z - z.max())
+    return np.asarray(p / p.sum())
+
+
+def grouped(names: Sequence[frozenset[str]], share: Sequence[float]) -> Grouped:
+    """Sets whose names are the same count together."""
+    groups: dict[frozenset[str], list[int]] = {}
+    marginal: dict[str, float] = {}
+    for i, (own, q) in enumerate(zip(names, share, strict=True)):
+        groups.setdefault(own, []).append(i)
+        for n in own:
+            marginal[n] = marginal.get(n, 0.0) + q
+    order = sorted(groups.values(), key=lambda g: -sum(share[i] for i in g))
+    return Grouped(tuple(tuple(g) for g in order), marginal)
+
+
+def first_of(
+    blocks: Sequence[Block], inner: FloatArray, beside: Members = (), *, but: Container[int] = ()
+) -> list[int]:
+    """The few blocks that gain most beside a set, without those `but`."""
+    state = start(inner)
+    for m in beside:
+        state = added(state, m, blocks[m])
+    gains = [
+        (scored(state, b)[0] + b.log_prior, i)
+        for i, b in enumerate(blocks)
+        if i not in beside and i not in but and _shows(state, b, inner)
+    ]
+    return [i for gain, i in sorted(gains, reverse=True)[:FEW] if gain > 0.0]
+
+
+def searched(blocks: Sequence[Block], inner: FloatArray, may_join: MayJoin) -> dict[Members, float]:
+    """Evidence of the sets that are visited: the best ones of each size carried on, then members exchanged.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+    inner : array (K + 1, K + 1)
+        Inner products of all columns, the residual last.
+    may_join : callable
+        Whether a block may join the set of a state.
+    """
+
+    def joining(state: State) -> list[tuple[int, float]]:
+        return [
+            (i, scored(state, b)[0] + b.log_prior)
+            for i, b in enumerate(blocks)
+            if i not in state.members and may_join(state, b) and _shows(state, b, inner)
+        ]
+
+    states = [start(inner)]
+    sets: dict[Members, float] = {(): 0.0}
+    for _ in range(MOST):
+        new: dict[Members, tuple[float, State, int]] = {}
+        for state in states:
+            for i, gain in joining(state):
+                key = tuple(sorted((*state.members, i)))
+                total = state.evidence + gain
+                if key not in new or new[key][0] < total:
+                    new[key] = (total, state, i)
+        for key, (total, _, _) in new.items():
+            sets.setdefault(key, total)
+        top = sorted(new.values(), key=lambda x: -x[0])[:WIDTH]
+        if not top or top[0][0] < max(sets.values()) - DIES:
+            break
+        states = [added(state, i, blocks[i]) for _, state, i in top]
+    for members in sorted(sets, key=lambda k: -sets[k])[:SWAPPED]:
+        for out in members if len(members) > 1 else ():
+            state = start(inner)
+            for m in members:
+                if m != out:
+                    state = added(state, m, blocks[m])
+            for i, gain in joining(state):
+                key = tuple(sorted((*state.members, i)))
+                sets[key] = max(sets.get(key, -math.inf), state.evidence + gain)
+    return sets
+
+
+def _shows(state: State, block: Block, inner: FloatArray) -> bool:
+    """Whether a set leaves enough of a single column, and the values are not clearly beyond their bounds."""
+    c, A = list(block.columns), state.inner
+    if len(c) == 1 and A[c[0], c[0]] < max(SINGULAR * inner[c[0], c[0]], SMALLEST):
+        return False
+    if block.low is None or block.high is None:
+        return True
+    cov = np.linalg.inv(A[np.ix_(c, c)] + np.linalg.inv(SCALES[-1] ** 2 * block.prior))
+    value, reach = cov @ A[c, -1], BEYOND * np.sqrt(np.diag(cov))
+    return bool(np.all(value >= block.low - reach) and np.all(value <= block.high + reach))

@@ -1,0 +1,142 @@
+"""From sets of effects with their shares of the posterior to a verdict, on a drive and over a campaign alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic, TypeVar
+
+from aqualog.diagnose.probability import SURE, tempered
+from aqualog.diagnose.records import Alternative, Cause, Verdict
+from aqualog.diagnose.sets import grouped, shares
+
+__all__ = ["CREDIBLE", "PLACES", "Candidate", "Decision", "candidates", "decided", "whole"]
+
+CREDIBLE = 20.0  # evidence ratio within which places of one effect cannot be distinguished
+PLACES = 5.0  # evidence ratio within which the whole car is preferred to a part of it
+LEAST_SHARE = 1e-4  # probability of a set, below which its values are not looked at
+
+Option = TypeVar("Option")
+Causes = tuple[tuple[Cause, bool], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate(Generic[Option]):
+    """A set's causes, whether each is worth naming, its log `evidence` and its `share` of the posterior."""
+
+    option: Option
+    causes: Causes
+    evidence: float
+    share: float
+    sharp: float = math.nan
+
+    @property
+    def large(self) -> tuple[Cause, ...]:
+        """Causes worth naming."""
+        return tuple(c for c, is_large in self.causes if is_large)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Their effects."""
+        return frozenset(c.effect for c in self.large)
+
+
+@dataclass(frozen=True, slots=True)
+class Decision(Generic[Option]):
+    """Verdict, causes, alternatives; `best` None where there is no cause, `group` the sets of the same names.
+
+    `certain`: effects beyond doubt; `rivals`: what remains, with its share, where the causes cannot be distinguished;
+    `notes`: what is too small to be worth naming, what other places are as likely, what speaks against a name.
+    """
+
+    verdict: Verdict
+    causes: tuple[Cause, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
+    best: Candidate[Option] | None = None
+    group: tuple[Candidate[Option], ...] = ()
+    certain: frozenset[str] = frozenset()
+    rivals: tuple[tuple[Candidate[Option], float], ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def candidates(options: Sequence[tuple[Option, float]], causes: Callable[[Option], Causes]) -> list[Candidate[Option]]:
+    """Options and their log evidence as sets with causes, most likely first, without those that hardly count."""
+    if not options:
+        return []
+    p = shares([e for _, e in options]).tolist()
+    out = [Candidate(o, causes(o), e, q) for (o, e), q in zip(options, p, strict=True) if q >= LEAST_SHARE]
+    return sorted(out, key=lambda s: -s.share)
+
+
+def whole(s: Candidate[Option]) -> int:
+    """How many causes act on the whole car."""
+    return sum(c.where is None for c, _ in s.causes)
+
+
+def decided(
+    sets: Sequence[Candidate[Option]],
+    pick: Callable[[Sequence[Candidate[Option]]], Candidate[Option]],
+    failing: Callable[[Candidate[Option]], Sequence[str]],
+) -> Decision[Option]:
+    """The verdict on sets without an unknown form.
+
+    A name needs a probability of 0.95. Else the answer is what the posterior consists of, up to 0.95. Sets whose causes
+    worth naming are the same count together.
+
+    Parameters
+    ----------
+    sets : sequence of Candidate
+    pick : callable
+        Which one of a group that differs in places only stands for it.
+    failing : callable
+        What speaks against naming a set's causes.
+    """
+    together = grouped([s.names for s in sets], [s.share for s in sets])
+    ranked = [[sets[i] for i in g] for g in together.groups]
+    if not ranked or not ranked[0][0].names:
+        return Decision("no_effect", notes=_small(ranked[0][0]) if ranked else ())
+    best, group = pick(ranked[0]), tuple(ranked[0])
+    own = _with_probability(best.large, together.marginal)
+    notes = _small(best) + _other_places(best, group)
+    failed = failing(best)
+    unsure = frozenset(c.effect for c in own if c.probability < SURE)
+    if not unsure and not failed:
+        return Decision("named" if len(own) == 1 else "compound", own, (), best, group, best.names, (), notes)
+    others, total = [], sum(s.share for s in group)
+    rivals = [(best, total)]
+    for g in ranked[1:]:
+        if total >= SURE:
+            break
+        weight = sum(s.share for s in g)
+        total += weight
+        if g[0].names:
+            ratio = math.exp(min(max(group[0].evidence - g[0].evidence, 0.0), 700.0))
+            rivals.append((pick(g), weight))
+            others.append(Alternative(_with_probability(rivals[-1][0].large, together.marginal), ratio))
+    shown = {c.effect: c for a in reversed(others) for c in a.causes} | {c.effect: c for c in own}
+    names = [c.effect for c in own] + [n for n in shown if n not in best.names]
+    certain = frozenset() if failed else best.names - unsure
+    ordered = sorted(names, key=lambda n: n not in certain)
+    notes += tuple(f"Not named: {reason}" for reason in failed)
+    return Decision(
+        "cannot_tell", tuple(shown[n] for n in ordered), tuple(others), best, group, certain,
+        tuple((s, q / total) for s, q in rivals), notes,
+    )  # fmt: skip
+
+
+def _with_probability(causes: Sequence[Cause], marginal: Mapping[str, float]) -> tuple[Cause, ...]:
+    return tuple(replace(c, probability=tempered(marginal.get(c.effect, 0.0))) for c in causes)
+
+
+def _small(s: Candidate[Option]) -> tuple[str, ...]:
+    return tuple(f"Significant, but too small to be worth naming: {c.sentence}" for c, large in s.causes if not large)
+
+
+def _other_places(best: Candidate[Option], group: Sequence[Candidate[Option]]) -> tuple[str, ...]:
+    """Sentences about the same effects at other places that explain the log as well, or nearly so."""
+    own = {c.key for c in best.large}
+    near = [s for s in group if s.share * CREDIBLE > group[0].share]
+    return tuple(
+        dict.fromkeys(f"Equally possible: {c.sentence}" for s in near for c in s.large if c.key not in own)
+    )  # fmt: skip

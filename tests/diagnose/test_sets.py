@@ -1,0 +1,69 @@
+"""Sets of blocks: the search visits the right one, shares add up by name, a form needs what no effect explains."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from aqualog.diagnose.competition import Block
+from aqualog.diagnose.sets import evidence_of, fitted_in, grouped, ranked, searched
+from aqualog.diagnose.unexplained import clear_forms
+
+RNG = np.random.default_rng(5)
+X = RNG.standard_normal((400, 6))
+
+
+def inner(y):
+    rows = np.concatenate([X, y[:, None]], axis=1)
+    return rows.T @ rows
+
+
+def block(i, columns, kind="effect"):
+    return Block(f"b{i}", kind, columns, np.eye(len(columns)), np.log(0.03), i)
+
+
+BLOCKS = [*(block(i, (i,)) for i in range(4)), block(4, (4, 5), "shape")]
+
+
+FIELD = SimpleNamespace(blocks=tuple(BLOCKS), name=lambda m: BLOCKS[m].key)
+
+
+def always(state, other):
+    return True
+
+
+def test_search_finds_the_set_and_its_values():
+    G = inner(X @ [0.0, 1.0, 0.0, -0.7, 0.0, 0.0] + 0.5 * RNG.standard_normal(400))
+    found = ranked(searched(BLOCKS, 4.0 * G, always), lambda m: BLOCKS[m].key)
+    assert found.best == (1, 3)
+    assert found.probability.sum() == pytest.approx(1.0)
+    assert found.marginal["b1"] > 0.99
+    assert fitted_in(BLOCKS, 4.0 * G, found.best).mean == pytest.approx([1.0, -0.7], abs=0.1)
+
+
+def test_a_block_that_may_not_join_does_not():
+    G = inner(X @ [0.0, 1.0, 0.0, -0.7, 0.0, 0.0] + 0.5 * RNG.standard_normal(400))
+    sets = searched(BLOCKS, 4.0 * G, lambda state, other: {*state.members, BLOCKS.index(other)} != {1, 3})
+    assert (1, 3) not in sets
+    assert (1,) in sets
+    assert (3,) in sets
+
+
+def test_sets_of_the_same_names_count_together():
+    names = [frozenset("a"), frozenset("ab"), frozenset("a")]
+    found = grouped(names, [0.3, 0.4, 0.3])
+    assert found.groups == ((0, 2), (1,))
+    assert found.marginal["a"] == pytest.approx(1.0)
+    assert found.marginal["b"] == pytest.approx(0.4)
+
+
+def test_a_form_is_clear_where_no_effect_explains_it():
+    def forms(y):
+        G = 4.0 * inner(y + 0.5 * RNG.standard_normal(400))
+        sets = ranked(searched(BLOCKS, G, always), lambda m: BLOCKS[m].key)
+        return [c.own for c in clear_forms(FIELD, sets, G)], sets, G
+
+    shaped, sets, G = forms(X @ [0.0, 1.0, 0.0, 0.0, 0.8, 0.8])
+    assert shaped == [(4,)]
+    assert evidence_of(BLOCKS, G, sets.best) > evidence_of(BLOCKS, G, (1,)) + 5.0
+    assert forms(X @ [0.0, 1.0, 0.0, 0.0, 0.0, 0.0])[0] == []

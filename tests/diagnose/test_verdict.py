@@ -1,0 +1,53 @@
+"""Verdicts from sets with evidence: a name needs 0.95 and its checks, else the answer is what the posterior holds."""
+
+import pytest
+
+from aqualog.diagnose.probability import SURE
+from aqualog.diagnose.records import Cause, Estimate
+from aqualog.diagnose.verdict import candidates, decided
+
+
+def cause(name, where=None, *, large=True):
+    return Cause(name, where, {"x": Estimate(1.0, 0.5, 1.5, "-")}, (), f"{name} {where}."), large
+
+
+def verdict(options, failed=()):
+    sets = candidates([(tuple(causes), evidence) for causes, evidence in options], lambda causes: causes)
+    return decided(sets, lambda group: group[0], lambda best: failed)
+
+
+def test_a_set_far_ahead_is_named_with_its_probability():
+    found = verdict([([cause("drag")], 0.0), ([cause("slope")], -15.0), ([], -40.0)])
+    assert found.verdict == "named"
+    assert found.causes[0].probability >= SURE
+    assert found.certain == {"drag"}
+
+
+def test_close_sets_are_listed_until_they_hold_the_posterior():
+    found = verdict([([cause("drag"), cause("gain")], 0.0), ([cause("slope"), cause("gain")], -1.0), ([], -40.0)])
+    assert found.verdict == "cannot_tell"
+    assert [c.effect for c in found.causes] == ["gain", "drag", "slope"]
+    assert found.certain == {"gain"}
+    assert [[c.effect for c in a.causes] for a in found.alternatives] == [["slope", "gain"]]
+    assert found.alternatives[0].evidence_ratio == pytest.approx(2.71828, rel=1e-4)
+    assert sum(q for _, q in found.rivals) == pytest.approx(1.0)
+
+
+def test_the_same_names_at_other_places_count_together():
+    found = verdict([([cause("drag", "f")], 0.0), ([cause("drag", "r")], -0.5), ([cause("slope")], -15.0)])
+    assert found.verdict == "named"
+    assert found.notes == ("Equally possible: drag r.",)
+
+
+def test_a_cause_that_fails_its_check_is_not_named():
+    found = verdict([([cause("drag")], 0.0), ([], -40.0)], failed=("it has no gain.",))
+    assert found.verdict == "cannot_tell"
+    assert found.certain == frozenset()
+    assert found.notes == ("Not named: it has no gain.",)
+
+
+def test_what_is_too_small_is_no_effect():
+    found = verdict([([cause("drag", large=False)], 0.0), ([], -40.0)])
+    assert (found.verdict, found.causes) == ("no_effect", ())
+    assert found.notes == ("Significant, but too small to be worth naming: drag None.",)
+    assert verdict([]).verdict == "no_effect"
