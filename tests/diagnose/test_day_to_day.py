@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from aqualog.core.vehicle import Provenance
-from aqualog.diagnose.arena import arena_of
+from aqualog.diagnose.arena import arena_of, known_only
 from aqualog.diagnose.day_to_day import as_value, day_to_day
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.evidence import gram_of, noises_after, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import simulated
@@ -30,11 +29,11 @@ def seen(car, asked, value, hidden):
     """Gain of the first effect, hidden with this value, in the test, its value and its standard deviation."""
     d = prepare(signals(hidden, sensors=NOISY), car, "a")
     evidence = simulated([d], asked, Model(), lambda _t, _s: None)
-    noises = noises_after(evidence, evidence.residuals, {0: value})
-    gram = tolerant(evidence, gram_of(evidence, noises, evidence.residuals))
-    arena = arena_of(evidence, ())
+    arena = known_only(arena_of(evidence, ()), ())
     without = [r - value * s[0] for r, s in zip(evidence.residuals, evidence.signatures, strict=True)]
-    measure = metric(arena, arena.weighed(without), share=KNOWN, beside=(0,))
+    weighings = arena.weighed(without)
+    gram = arena.tolerant(arena.inner(weighings))
+    measure = metric(arena, weighings, share=KNOWN, beside=(0,))
     r = refit(evidence, (0,), np.array([0.8 * value]), measure, Model())
     gain = 0.5 * float(gram[0, -1] ** 2 / gram[0, 0])
     return evidence, gain, float(r.values[0]), float(np.sqrt(r.covariance[0, 0]))

@@ -118,13 +118,14 @@ def test_jumps_of_the_torque_are_left_out_and_no_more_than_that():
 
 
 def test_radii_are_not_known_where_wheel_speeds_are_those_of_a_control_unit():
-    told = replace(CAR, given=CAR.given | {"wheels.r_e_f", "wheels.r_e_r", "wheels.inertia_f"})
+    radii = {"wheels.r_e_f", "wheels.r_e_r"}
+    told = replace(CAR, given=CAR.given | {*radii, "wheels.inertia_f"})
     log = plain()
     kmh = {n: replace(o, unit="km/h") if n.startswith("omega_") else o for n, o in log.origins.items()}
     unknown = {n: replace(o, unit="") for n, o in log.origins.items()}
     assert prepare(log, told, "a").vehicle is told
     assert prepare(replace(log, origins=unknown), told, "a").vehicle is told
-    assert prepare(replace(log, origins=kmh), told, "a").vehicle.given == CAR.given | {"wheels.inertia_f"}
+    assert prepare(replace(log, origins=kmh), told, "a").vehicle.given == told.given - radii
 
 
 def test_without_torque_the_torque_that_the_model_needs_stands_in():

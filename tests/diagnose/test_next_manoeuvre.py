@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aqualog.core.records import Signals
-from aqualog.core.vehicle import Vehicle
+from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.arena import make_arena
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import prepare
@@ -26,8 +26,8 @@ from aqualog.model.sensors import Channel
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 
-# radii that a file does not give are hardly known, and then no run tells them from the velocity's scale
-CAR = Vehicle(name="test car", given=frozenset({"drivetrain", "mass", "wheels.r_e_f", "wheels.r_e_r"}))
+# what a file does not give is hardly known, and then no run tells it from an effect
+CAR = Vehicle(name="test car", given=frozenset(KEYS))
 NOISE = {"a_x": 0.05, "a_y": 0.05, "v_x": 0.02, "yaw_rate": 2e-3, "omega": 0.01, "torque": 2.0}
 SENSORS = replace(PERFECT, channels={
     n: Channel(noise=x)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aqualog.diagnose.arena import arena_of
+from aqualog.diagnose.arena import arena_of, known_only
 from aqualog.diagnose.compete import compete, fitted
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import Hypothesis
@@ -21,7 +21,7 @@ def one(name, where=None):
 def prepared(asked, *terms, seed=3, model=Model()):  # noqa: B008 - frozen
     d = prepare(signals(*terms, sensors=NOISY, seed=seed), CAR, "a")
     evidence = simulated([d], asked, model, lambda _t, _s: None)
-    arena = arena_of(evidence, ())
+    arena = known_only(arena_of(evidence, ()), ())
     posterior = compete(arena)
     members = tuple(range(len(arena.blocks)))
     fit = fitted(arena, posterior.tolerant, members)
@@ -108,7 +108,7 @@ def test_a_change_of_what_the_model_has_already():
 def test_the_metric_is_that_of_the_tolerant_inner_products():
     asked = [one("payload_mass"), one("aero_drag"), one("tyre_radius", "fl")]
     evidence, _, measure = prepared(asked, term("payload_mass", delta_mass=250.0))
-    arena = arena_of(evidence, ())
+    arena = known_only(arena_of(evidence, ()), ())
     y = measure.rows([r[None] for r in evidence.residuals])
     whole = arena.tolerant(arena.inner(measure.weighings))
     assert float(metric(arena, measure.weighings).inner(y, y)[0, 0]) == pytest.approx(whole[-1, -1], rel=1e-5)
