@@ -37,11 +37,12 @@ LEAST = 300  # samples off the water that the check needs at the least
 def compatible(evidence: Evidence, members: Sequence[int]) -> bool:
     """Whether a set holds each effect once per wheel, in one variant, and does not delay every signal.
 
-    Delays are relative: a delay of all signals only shifts the start of the log's clock.
+    Delays are relative: a delay of all signals only shifts the start of the log's clock, and one of all but one signal
+    is that signal's own, with the other sign.
     """
     for effect in {evidence.asked[m].effect.name for m in members if evidence.asked[m].effect.drive.is_relative}:
         late = {evidence.asked[m].where for m in members if evidence.asked[m].effect.name == effect}
-        if len(late) > 1 and late == {h.where for h in evidence.asked if h.effect.name == effect}:
+        if len(late) > 1 and len(late) >= len({h.where for h in evidence.asked if h.effect.name == effect}) - 1:
             return False
     seen: set[tuple[str, str]] = set()
     for m in members:

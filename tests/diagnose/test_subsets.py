@@ -167,8 +167,9 @@ def test_a_car_carries_one_load():
     assert compatible(b, (0, 2))
 
 
-def test_a_delay_of_every_signal_is_another_start_of_the_clock():
-    asked = tuple(hypothesis("signal_delay", w) for w in ("v_x", "a_x", "torque"))
+def test_a_delay_of_all_signals_but_one_is_that_ones():
+    asked = tuple(hypothesis("signal_delay", w) for w in ("v_x", "a_x", "omega", "torque"))
     evidence = made(asked=asked)
     assert compatible(evidence, (0, 1))
     assert not compatible(evidence, (0, 1, 2))
+    assert not compatible(evidence, (0, 1, 2, 3))
