@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from aqualog.face.slip_slope import slip_slope
     from aqualog.model.term import Model
 
-__version__ = "0.13.0"
+__version__ = "0.14.0"
 
 _FACE = {
     "read": "aqualog.face.drive",

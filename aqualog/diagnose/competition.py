@@ -26,7 +26,7 @@ __all__ = ["COARSE", "SCALES", "Block", "State", "added", "scored", "start", "va
 
 # share of the log-likelihood that counts in a competition: shares of the posterior are then about as often right as
 # they say, on drives of two other simulators (D)
-COARSE = 0.5
+COARSE = 0.3
 SCALES = (1.0, 3.0)  # of the usual size: half of all deviations are three times as usual ones (K)
 
 

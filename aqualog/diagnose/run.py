@@ -218,7 +218,13 @@ def _led(drive: Drive, model: Model) -> FloatArray:
 def _with_road(outcome: Outcome, road: Profile) -> Outcome:
     cause, own = road.cause, outcome.causes
     if not road.is_large or cause.probability < SURE:
-        note = f"Not named (probability {cause.probability:.2f}): {cause.sentence}"
+        sure = cause.probability >= SURE
+        note = (
+            "Significant, but too small to be worth naming"
+            if sure
+            else f"Probability {cause.probability:.2f}, not named"
+        )
+        note = f"{note}: {cause.sentence}"
         return outcome._replace(small=(*outcome.small, note))
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
         # one road: a constant slope is its mean, whose interval knows that it is an offset as well
