@@ -127,8 +127,8 @@ def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
 def _probability(wheels: Sequence[PerTurn], value: Estimate, smallest: float) -> float:
     """That it is there and larger than what sound wheels show.
 
-    There: from the p-value of each wheel by the bound -e p ln p on the evidence for chance, of Sellke, Bayarri and
-    Berger (2001). Larger: from the interval, as of a normal distribution.
+    There: from the p-value of each wheel by the bound -e p ln p on the evidence for chance [sellke2001]. Larger: from
+    the interval, as of a normal distribution.
     """
     there = 1.0
     for f in wheels:

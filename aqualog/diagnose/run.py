@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +15,9 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, widened
+from aqualog.diagnose.arena import KNOWN_PRIOR
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
+from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
@@ -37,6 +41,9 @@ from aqualog.model.term import Model
 __all__ = ["Options", "diagnose"]
 
 LEAST_USED_S = 20.0
+# of twice the log-likelihood that an effect must gain to be more likely than none: its prior, and what its freedom costs
+# in the competition (2.5 nats (natural logarithm), typical of 300 s)
+HEARD = 2.0 * (2.5 - math.log(KNOWN_PRIOR)) / COARSE
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,21 +106,8 @@ def diagnose(
         return _not_testable(ready, model, reason, notes, vehicle)
     if model.terms:
         ready = [led_by(d, model) for d in ready]
-    road = find_profile(ready[0], residual(ready[0], model)) if len(ready) == 1 else None
-    bare = model
-    if road is not None:
-        # named or not: a car needs more torque uphill, and the torque would appear to be the cause
-        model = with_profile(model, road)
-        ready = [led_by(d, model) for d in ready]
-    asked, untested = hypotheses(ready, model)
-    evidence = simulated(ready, asked, model, tell)
-    moved = recentred(evidence, model)
-    if moved != model:
-        notes += _moved(moved, model)
-        bare = Model((*bare.terms, *(t for t in moved.terms if t not in model.terms)))
-        model, ready = moved, [led_by(d, moved) for d in ready]
-        evidence = simulated(ready, asked, model, tell)
-    evidence = supported(evidence)
+    ready, model, bare, road, asked, untested, evidence, moved = _simulated(ready, model, tell)
+    notes += moved
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(found, model)
     outcome, agreed = _by_drive(found, outcome, model)
@@ -125,7 +119,8 @@ def diagnose(
     names = {d.name for d in ready}
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
     outcome = joined(outcome, seen)
-    sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.inflation, found.calibration.threshold)
+    threshold = max(found.calibration.threshold, HEARD)
+    sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.inflation, threshold)
     before = list(evidence.residuals) if road is None else [_led(d, bare) for d in ready]
     after = before if extended.terms == bare.terms else [_led(d, extended) for d in ready]
     gained = None
@@ -158,6 +153,39 @@ def diagnose(
         agreement=agreed if outcome.causes else (),
         caution=not_calibrated(vehicle),
     )
+
+
+class _Setting(NamedTuple):
+    """Drives with the model that the search starts from, and what it asks: `bare` is the model without the road."""
+
+    ready: list[Drive]
+    model: Model
+    bare: Model
+    road: Profile | None
+    asked: tuple[Hypothesis, ...]
+    untested: dict[str, str]
+    evidence: Evidence
+    notes: tuple[str, ...]
+
+
+def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
+    """The road of a single drive first, then the effects, around values that the file is not sure of."""
+    bare = model
+    notes: tuple[str, ...] = ()
+    road = find_profile(ready[0], residual(ready[0], model)) if len(ready) == 1 else None
+    if road is not None:
+        # named or not: a car needs more torque uphill, and the torque would appear to be the cause
+        model = with_profile(model, road)
+        ready = [led_by(d, model) for d in ready]
+    asked, untested = hypotheses(ready, model)
+    evidence = simulated(ready, asked, model, tell)
+    moved = recentred(evidence, model)
+    if moved != model:
+        notes = _moved(moved, model)
+        bare = Model((*bare.terms, *(t for t in moved.terms if t not in model.terms)))
+        model, ready = moved, [led_by(d, moved) for d in ready]
+        evidence = simulated(ready, asked, model, tell)
+    return _Setting(ready, model, bare, road, asked, untested, supported(evidence), notes)
 
 
 def _moved(moved: Model, model: Model) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What a run or check would tell about the sets that remain: its data as each set predicts them, after the log."""
+"""What a run or check would show of the sets that remain: its data as each set predicts them, after the log."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
-    """`information` [nat] that a run is expected to give; `right`: probability that the likeliest cause is the true
-    one; `pairs` (S, S): the same between two sets."""
+    """`information` [nats (natural logarithm)] that a run is expected to give; `right`: probability that the likeliest
+    cause is the true one; `pairs` (S, S): the same between two sets."""
 
     information: float
     right: float
@@ -83,7 +83,7 @@ class Forecast:
 
 
 def entropy(p: FloatArray) -> FloatArray:
-    """Missing information of probabilities (..., S). [nat]"""
+    """Missing information of probabilities (..., S). [nats (natural logarithm)]"""
     return np.asarray(-(p * np.log(np.maximum(p, 1e-300))).sum(axis=-1))
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
+from aqualog.model.checks import JACKED, ROLLED, STANDSTILL
 from aqualog.model.plant import Plant, with_mass_at
 from aqualog.model.sensors import Channel
 from aqualog.model.term import (
@@ -188,20 +189,6 @@ _LIKE_AN_OFFSET = ("road_grade", "rolling_resistance")
 # change by 5 % with a few degrees, the driveline turns with the wheels, half a sample lies between two buses, scrub and
 # crowned roads differ, tyres follow their load by other laws, warm up and grow a little on every drive (K). Tyres of
 # one size differ by 1 % in radius, wheels by a third in inertia, slopes of the slip from 25 to 40 (K).
-_STANDSTILL = Check(  # level to 0.3 %: twice in opposite directions at one place, and the mean of both
-    "standstill", "Stand for half a minute, turn the car round at the same place and stand again: the mean of both "
-    "readings of the accelerometer is its bias", 5.0, ("a_x", None), "bias", 0.01,
-)  # fmt: skip
-
-_JACKED = Check(
-    "jacked_wheel", "Jack up each wheel and turn it in neutral with a torque wrench", 20.0,
-    (None, "f", "r", "fl", "fr", "rl", "rr"), "torque", 2.0,
-)  # fmt: skip
-_ROLLED = Check(  # 2 cm and the load's share of ten turns, 20 m
-    "rolled_distance", "Roll the car ten turns of each wheel and measure the way", 20.0,
-    (None, "f", "r", "fl", "fr", "rl", "rr"), "delta", 0.002,
-)  # fmt: skip
-
 _ALL = [
     Effect(
         "road_grade", "slope angle of the road [rad]", "The road climbs by {grade:.1%}.",
@@ -262,7 +249,7 @@ _ALL = [
             DayToDay("rolling", _as_brake)),),
         _plus(brake_drag="torque"), _WHEEL_PLACES,
         twins=("rolling_resistance",),
-        drive=DriveSearch((_TORQUE,), by_wheel=True, check=_JACKED),
+        drive=DriveSearch((_TORQUE,), by_wheel=True, check=JACKED),
     ),
     Effect(
         "cornering_drag", "resistance in curves [s^2/m]", "Curves cost more than the two-track model says.",
@@ -317,7 +304,7 @@ _ALL = [
         (Parameter("bias", "m/s^2", 0.0, 0.2, -2.0, 2.0, 0.03, "added"),),
         _on_channels(lambda c, v: replace(c, bias=c.bias + v["bias"])), ("a_x", "a_y"), "a_x", twins=("road_grade",),
         drive=DriveSearch(
-            places=_PAIR, tolerance_at={"a_y": 0.1}, equals=_LIKE_AN_OFFSET, check=_STANDSTILL),
+            places=_PAIR, tolerance_at={"a_y": 0.1}, equals=_LIKE_AN_OFFSET, check=STANDSTILL),
     ),
     Effect(
         "accelerometer_gain", "accelerometer [-]", "The accelerometer reads {gain:.3f} times the truth.", "1-3 % (K)",
@@ -387,7 +374,7 @@ _ALL = [
         _on_plant(lambda p, v, w: p._replace(
             **{n: _changed(getattr(p, n), w, np.multiply, 1.0 + v["delta"]) for n in ("r_e", "r_l")})),
         _WHEEL_PLACES, twins=("velocity_scale",),
-        drive=DriveSearch((_SPEEDS,), by_wheel=True, axle_key="wheels.r_e_", check=_ROLLED), belongs="tyre",
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, axle_key="wheels.r_e_", check=ROLLED), belongs="tyre",
     ),
     Effect(
         "pressure_loss", "radius and slip slope of a tyre that loses its air", "The tyre lost its air.",

@@ -127,10 +127,12 @@ def test_no_load_is_told_that_was_not_there(loaded):
 
 def test_delay_of_the_loaded_trip_is_the_torques(real_logs, bmw, loaded):
     """Calibration finds the same by other means."""
-    (delay,) = (c.parameters["delay"] for c in loaded.causes if c.key == "signal_delay@torque")
+    delays = [c.parameters["delay"] for c in loaded.causes if c.key == "signal_delay@torque"]
     late = calibrate([trip_of(real_logs, bmw, "B24")], ["B24"], bmw, {"mass": bmw.mass}).drives[0].torque_lag_s
     assert late > 0.02
-    assert delay.low < late < delay.high
+    assert all(d.low < late < d.high for d in delays)
+    (limit,) = (x for x in loaded.limits if (x.effect, x.where) == ("signal_delay", "torque"))
+    assert delays or late < limit.size  # a single trip shows it hardly
     assert any("too small to be worth naming: The road" in n for n in loaded.notes)
 
 

@@ -60,7 +60,7 @@ def diagnose_campaign(
     level : float
         Family-wise probability of a finding where no effect is present.
     surrogates : int
-        Draws of noise that the test is calibrated with; 0: Bonferroni's bound.
+        Draws of noise that the test is calibrated with; 0: Bonferroni's bound [bonferroni1936].
     model : Model, optional
         Terms that are known already.
     progress : callable, optional
