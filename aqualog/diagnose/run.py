@@ -41,8 +41,8 @@ from aqualog.model.term import Model
 __all__ = ["Options", "diagnose"]
 
 LEAST_USED_S = 20.0
-# of twice the log-likelihood that an effect must gain to be more likely than none: its prior, and what its freedom costs
-# in the competition (2.5 nats (natural logarithm), typical of 300 s)
+# of twice the log-likelihood that an effect must gain to be more likely than none: its prior, and what its freedom
+# costs in the competition (2.5 nats (natural logarithm), typical of 300 s)
 HEARD = 2.0 * (2.5 - math.log(KNOWN_PRIOR)) / COARSE
 
 
