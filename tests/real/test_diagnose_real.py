@@ -121,7 +121,7 @@ def test_no_load_is_told_that_was_not_there(loaded):
     ]
     assert all(e.low < LOADED < e.high for e in loads)
     (limit,) = (x for x in loaded.limits if (x.effect, x.where) == ("payload_mass", None))
-    assert loads or LOADED < limit.size < 300.0
+    assert loads or LOADED < limit.size < 0.3 * 1375.0  # a share of the likelihood counts: limits are wide
     assert not any(c.effect == "torque_gain" for c in loaded.causes)  # it is within what trips differ by
 
 
