@@ -17,7 +17,7 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import block_step, contrasts
 from aqualog.diagnose.competition import Block
 from aqualog.diagnose.drive import Drive
-from aqualog.diagnose.evidence import Evidence
+from aqualog.diagnose.evidence import Evidence, forgiving
 from aqualog.diagnose.hypotheses import residual
 from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.shapes import Shape, shapes
@@ -127,11 +127,7 @@ class Arena:
 
     def tolerant(self, gram: FloatArray) -> FloatArray:
         """Inner products that forgive the tolerances, by Woodbury's identity."""
-        k = np.flatnonzero((np.diag(self.tolerance) > 0.0) & (np.diag(gram)[:-1] > 1e-12))
-        P = self.tolerance[np.ix_(k, k)]
-        root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
-        B = gram[:, k] @ root
-        return np.asarray(gram - B @ np.linalg.solve(np.eye(k.size) + root.T @ gram[np.ix_(k, k)] @ root, B.T))
+        return forgiving(gram, self.tolerance)
 
     def weighed(self, residuals: Sequence[FloatArray]) -> tuple[Weighing, ...]:
         """The weighing of each part by the noise of a residual of it."""

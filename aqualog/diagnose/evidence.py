@@ -17,7 +17,7 @@ from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.spectrum import weighing
 from aqualog.model.term import Kind, Model
 
-__all__ = ["Evidence", "make_evidence", "recentred", "tolerant"]
+__all__ = ["Evidence", "forgiving", "make_evidence", "recentred", "tolerant"]
 
 FARTHEST = 2.0  # standard deviations, beyond which a fault is likelier than an error of the file
 
@@ -98,16 +98,23 @@ def _drag_speed(drives: Sequence[Drive]) -> float:
     return float((v**3).sum() / max(float((v**2).sum()), 1e-9))
 
 
-def tolerant(evidence: Evidence, gram: FloatArray) -> FloatArray:
-    """Inner products in a metric that tolerates the usual errors of every parameter.
+def forgiving(gram: FloatArray, tolerance: FloatArray) -> FloatArray:
+    """Inner products (K + 1, K + 1) in a metric that tolerates deviations of the covariance `tolerance` (K, K).
 
     No vehicle file is exact and no simulator is the car: a radius may be 0.03 % off, a tyre's curve a few percent. With
     enough samples every such error is significant. The covariance of the residual is that of the noise plus that of all
-    these deviations, I + X S^2 X'. By Woodbury's identity its inverse is I - A (S^-2 + A' A)^-1 A'.
+    these deviations, I + X P X'. Woodbury's identity gives the inner products with its inverse.
     """
-    k = np.flatnonzero((evidence.forgiven > 0.0) & (np.diag(gram)[:-1] > 1e-12))
-    inner = gram[np.ix_(k, k)] + np.diag(evidence.forgiven[k] ** -2.0)
-    return np.asarray(gram - gram[:, k] @ np.linalg.solve(inner, gram[k, :]))
+    k = np.flatnonzero((np.diag(tolerance) > 0.0) & (np.diag(gram)[:-1] > 1e-12))
+    P = tolerance[np.ix_(k, k)]
+    root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
+    B = gram[:, k] @ root
+    return np.asarray(gram - B @ np.linalg.solve(np.eye(k.size) + root.T @ gram[np.ix_(k, k)] @ root, B.T))
+
+
+def tolerant(evidence: Evidence, gram: FloatArray) -> FloatArray:
+    """Inner products that forgive the usual errors of every parameter."""
+    return forgiving(gram, np.diag(evidence.forgiven**2))
 
 
 def recentred(evidence: Evidence, model: Model) -> Model:

@@ -123,7 +123,6 @@ def _linear(arena: Arena, posterior: Posterior, members: Members, model: Model) 
     fit = fitted(arena, posterior.tolerant, members)
     sd = np.sqrt(np.diag(fit.covariance)) * arena.sd[fit.columns]
     mean = fit.mean * arena.sd[fit.columns]
-    drives = arena.evidence.drives
     out = []
     for b in (arena.blocks[m] for m in members):
         if b.kind != "effect":
@@ -133,7 +132,6 @@ def _linear(arena: Arena, posterior: Posterior, members: Members, model: Model) 
         made = [np.tensordot(mean[k], s[list(b.columns)], axes=1) for s in arena.evidence.signatures]
         before = arena.evidence.residuals
         explains = _explains(arena, before, [x - m for x, m in zip(before, made, strict=True)])
-        assert len(drives) == len(made)
         out.append(_cause(h, now + mean[k], mean[k], sd[k], explains))
     return out
 

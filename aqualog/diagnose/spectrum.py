@@ -53,15 +53,8 @@ class Weighing:
         return out
 
     def _rows(self, x: FloatArray) -> FloatArray:
-        return self._turned(whitened(spectra(bridged(x, self.mask)), self.noise).reshape(x.shape), self.inverse)
-
-    def coloured(self, flat: FloatArray) -> FloatArray:
-        """Rows of columns (k, C, n) that the autoregression has whitened: their inner products are the covariance of
-        the columns' inner products with the noise that is left."""
-        return self._turned(flat, np.linalg.inv(self.inverse).astype(np.complex128).conj().transpose(0, 2, 1))
-
-    def _turned(self, flat: FloatArray, by: Complex) -> FloatArray:
-        lines = np.matmul(by, _lines(flat[..., self.used], self.size).transpose(2, 1, 0))  # (F, C, k)
+        flat = whitened(spectra(bridged(x, self.mask)), self.noise).reshape(x.shape)
+        lines = np.matmul(self.inverse, _lines(flat[..., self.used], self.size).transpose(2, 1, 0))  # (F, C, k)
         return np.concatenate([lines.real, lines.imag]).reshape(-1, len(flat)).T
 
 
