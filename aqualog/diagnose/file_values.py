@@ -52,9 +52,9 @@ def own_sd(vehicle: Vehicle, path: str) -> float:
 
     A balance of forces shows the ratio of mass and torque gain. Once drives have calibrated one of them, that ratio is
     known. Both may be off together, which no drive shows. A file that says of no value where it comes from is taken at
-    its word for the keys that it sets.
+    its word, defaults of the whole car included; only axles whose key it does not set are those of another car.
     """
-    if not vehicle.provenance and path in vehicle.given:
+    if not vehicle.provenance and (path in vehicle.given or not path.endswith(("_f", "_r"))):
         return 0.0
     return 0.0 if path in ("mass", "torque_gain") and _is_bound(vehicle) else uncertainty(vehicle, path)
 

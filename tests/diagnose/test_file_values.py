@@ -94,7 +94,9 @@ def test_a_value_that_is_said_to_be_surer_deviates_less():
         assert of("tyre_radius", "f", car=car) == pytest.approx(uncertainty(car, "wheels.r_e_f") / 0.35)
     silent = replace(CAR, provenance={})  # a file that says nothing of its values is taken at its word
     assert of("aero_drag", car=silent) == 0.0
-    assert of("aero_drag", car=replace(silent, given=CAR.given - {"drag_area"})) > 0.0
+    lean = replace(silent, given=frozenset({"drivetrain", "mass"}))
+    assert of("aero_drag", car=lean) == of("torque_gain", car=lean) == 0.0  # a load must not pass for the gain
+    assert of("tyre_radius", "f", car=lean) > 0.0
     lost = replace(CAR, given=CAR.given - {"wheels.r_e_f"})  # as where wheel speeds are logged in km/h
     assert of("tyre_radius", "f", car=lost) == pytest.approx(0.015)
 

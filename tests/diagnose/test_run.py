@@ -1,6 +1,8 @@
 """The whole diagnosis on short simulated drives, asked about few effects."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import polars as pl
@@ -228,3 +230,16 @@ def test_a_late_velocity_is_named_without_one_of_the_wheels(monkeypatch):
     assert keys(d) == {"signal_delay@v_x"}
     assert d.causes[0].parameters["delay"].value == pytest.approx(0.1, abs=0.01)
     assert any("not all four wheel speeds" in n for n in d.notes)
+
+
+def test_the_sample_drive_is_named_with_a_file_that_says_nothing_of_its_sources(monkeypatch):
+    import aqualog as aq
+
+    monkeypatch.undo()
+    samples = Path(__file__).parents[2] / "sample_logs"
+    found = aq.diagnose(samples / "loaded_monday.parquet", samples / "vehicle.toml", views=False)
+    told = json.loads(found.to_json())
+    (cause,) = told["causes"]
+    low, high = cause["parameters"]["delta_mass"]["ci95"]
+    assert (told["verdict"], cause["effect"], cause["where"]) == ("named", "payload_mass", None)
+    assert low < 290.0 < high
