@@ -20,7 +20,7 @@ from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.evidence import Evidence, forgiving
 from aqualog.diagnose.hypotheses import residual
 from aqualog.diagnose.noise import white_noise
-from aqualog.diagnose.shapes import Shape, shapes
+from aqualog.diagnose.shapes import ALONG, Shape, shapes
 from aqualog.diagnose.spectrum import Weighing, weighing
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
@@ -33,7 +33,6 @@ MOST_BLOCKS = 12000  # of 0.1 s that compete; a longer drive does with its best 
 FORCE_N = 100.0  # of the force whose response stands for any force
 TOLERATED = ("v_x", "torque", "a_y", "a_x")  # coordinates along which a car and its simulation differ anyway
 CHUNK = 4096  # entries of rows that are multiplied together
-ALONG = ("t", "position")
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,18 +90,25 @@ class Arena:
         modulation = s.basis.columns[self.rows[part]].T * self.sd[c, None]
         return np.asarray(modulation[:, None, :] * p.responses[s.mechanism.source][None])
 
-    def inner(self, weighings: Sequence[Weighing]) -> FloatArray:
-        """Inner products (K + 1, K + 1) of all columns, the residual last, summed over the parts."""
+    def inner(self, weighings: Sequence[Weighing], only: BoolArray | None = None) -> FloatArray:
+        """Inner products (K + 1, K + 1) of all columns, the residual last, summed over the parts.
+
+        `only` (K,): columns that are wanted; the others are left zero.
+        """
         total = np.zeros((self.width + 1, self.width + 1))
-        known = self.evidence.count
+        known = np.arange(self.evidence.count)
+        wanted = np.ones(self.width, dtype=bool) if only is None else only
+        used = np.flatnonzero(np.append(wanted, True))
+        at = np.cumsum(wanted) - 1
+        known = known[wanted[known]]
         for i, (p, w) in enumerate(zip(self.parts, weighings, strict=True)):
-            rows = np.empty((self.width + 1, w.width), dtype=np.float32)
-            rows[:known] = w.rows(p.signatures * self.sd[:known, None, None])
+            rows = np.empty((used.size, w.width), dtype=np.float32)
+            rows[at[known]] = w.rows(p.signatures[known] * self.sd[known, None, None])
             for b in (*self.blocks, *self.forgiven):
-                if b.kind != "effect":
-                    rows[list(b.columns)] = w.rows(self.drawn(i, b))
+                if b.kind != "effect" and np.any(wanted[list(b.columns)]):
+                    rows[at[list(b.columns)]] = w.rows(self.drawn(i, b))
             rows[-1] = w.rows(p.residual[None])[0]
-            total += _products(rows)
+            total[np.ix_(used, used)] += _products(rows)
         return total
 
     def white(self) -> FloatArray:
@@ -127,10 +133,22 @@ class Arena:
 
     def tolerant(self, gram: FloatArray) -> FloatArray:
         """Inner products that forgive the tolerances, by Woodbury's identity."""
-        return forgiving(gram, self.tolerance)
+        return forgiving(gram, self.tolerance).gram
 
-    def weighed(self, residuals: Sequence[FloatArray]) -> tuple[Weighing, ...]:
-        """The weighing of each part by the noise of a residual of it."""
+    def made(self, part: int, values: FloatArray) -> FloatArray:
+        """What scaled values (K,) of all columns make of the residual of a part. (C, n)"""
+        p, k = self.parts[part], self.evidence.count
+        scaled = values * self.sd
+        out = np.tensordot(scaled[:k], p.signatures, axes=1)
+        for b in (*self.blocks, *self.forgiven):
+            v = scaled[list(b.columns)]
+            if b.kind != "effect" and np.any(v):
+                s = self.shapes[b.tag]
+                out += (s.basis.columns[self.rows[part]] @ v) * p.responses[s.mechanism.source]
+        return np.asarray(out)
+
+    def weighed(self, residuals: Sequence[Sequence[FloatArray]]) -> tuple[Weighing, ...]:
+        """The weighing of each part by the noise of draws of what is left of it."""
         return tuple(weighing(r, p.mask, contrasts(p.channels)) for r, p in zip(residuals, self.parts, strict=True))
 
 

@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.competition import COARSE, Block, State
-from aqualog.diagnose.evidence import Evidence
-from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, first_of, fitted_in, ranked, searched
+from aqualog.diagnose.evidence import Evidence, forgiving
+from aqualog.diagnose.hypotheses import THREADS
+from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, evidence_of, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
 
 __all__ = ["Fitted", "Members", "Posterior", "compete", "fitted", "rule"]
 
-ROUNDS = 3  # of noise after the best set so far
+ROUGHLY = 2  # sets that are carried on while the noise is sought
+ROUNDS = 4  # of noise, each after what the one before has found
+EACH = 2  # candidates, by coloured and by white noise, that a noise is tried after
+PAIRS, SEED = 2, 20  # of draws of a set's values
 CLEARLY = 1.0  # [nats] that a noise must make the measurement more likely
-OPTIMISM = 1.5  # [nats] a column by which noise after a fit is too likely
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,77 +40,82 @@ def fitted(arena: Arena, tolerant: FloatArray, members: Sequence[int]) -> Fitted
     return fitted_in(arena.blocks, tolerant, members)
 
 
+@dataclass(frozen=True, slots=True)
+class _Noise:
+    """A noise beside a set; `gram` (K + 1, K + 1) at least of the set and the tolerances.
+
+    `likely`: log of the measurement's marginal likelihood under noise, tolerances and the set, with the set's prior.
+    """
+
+    members: Members
+    weighings: tuple[Weighing, ...]
+    gram: FloatArray
+    likely: float
+
+
 def compete(arena: Arena) -> Posterior:
     """The posterior over the sets that a search with swaps visits.
 
-    The noise is that under which the measurement is most likely: after no block, after one of the first candidates in
-    the metrics of coloured and of white noise, or after the best set so far. Else a slow effect would count as noise
-    and could not be found. The noise is sought with the whole likelihood, the posterior has a share of it.
+    The noise is that beside which the measurement is most likely, after one of the first candidates in the metrics of
+    coloured and of white noise, or after the best set so far. Else a slow effect would count as noise and could not be
+    found. The noise is sought with the whole likelihood, the posterior has a share of it.
     """
-    weighings = arena.weighed([p.residual for p in arena.parts])
-    white = arena.tolerant(arena.white())
-    gram = arena.inner(weighings)
-    best: Members = ()
-    least = _surprise(weighings)
+    white = arena.white()
+    whitely = arena.tolerant(white)
+    noise = _noise(arena, arena.weighed([[p.residual] for p in arena.parts]), ())
+    gram = arena.inner(noise.weighings)
     for _ in range(ROUNDS):
         tolerant = arena.tolerant(gram)
-        quieter = _quieter(arena, best, (tolerant, white), least)
-        if quieter is not None:
-            least, weighings = quieter
-            gram = arena.inner(weighings)
-            tolerant = arena.tolerant(gram)
-        sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram))
-        now = max(sets, key=lambda k: sets[k])
-        again = arena.weighed(_left(arena, tolerant, now)) if now else weighings
-        is_better = _surprise(again) < _surprise(weighings) - CLEARLY
-        if is_better:
-            weighings = again
-            least = _surprise(again) + _price(arena, now)
-            gram = arena.inner(weighings)
-        if now == best or not (is_better or quieter):
+        sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram), width=ROUGHLY)
+        best = max(sets, key=lambda k: sets[k])
+        coloured = _beside(arena, tolerant, best)
+        others = [*_beside(arena, whitely, best), *_beside(arena, whitely, ())[1:]]
+        starts = [replace(noise, members=m, gram=gram) for m in coloured]
+        starts += [replace(noise, members=m, gram=white) for m in dict.fromkeys(others)]
+        with ThreadPoolExecutor(THREADS) as pool:
+            tried = list(pool.map(lambda n: _after(arena, n), starts))
+        # white noise is wrong: a second step is fairer
+        tried.append(_after(arena, max(tried[len(coloured) :], key=lambda n: n.likely)))
+        better = max(tried, key=lambda n: n.likely)
+        if better.likely < noise.likely + CLEARLY:
             break
-        best = now
+        noise = _after(arena, better)
+        gram = arena.inner(noise.weighings)
     tolerant = arena.tolerant(COARSE * gram)
     sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram))
     found = ranked(sets, arena.name)
-    return Posterior(found.sets, found.probability, found.marginal, found.blocks, gram, tolerant, tuple(weighings))
+    return Posterior(found.sets, found.probability, found.marginal, found.blocks, gram, tolerant, noise.weighings)
 
 
-def _quieter(
-    arena: Arena, best: Members, metrics: Sequence[FloatArray], least: float
-) -> tuple[float, tuple[Weighing, ...]] | None:
-    """Noise after one block more than the best set, under which the measurement is clearly more likely.
+def _beside(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
+    """A set, and the set with each of the blocks that gain most beside it."""
+    return [best, *((*best, m) for m in first_of(arena.blocks, inner, best)[:EACH])]
 
-    Functions of time and place are left out: they could be slow noise.
+
+def _after(arena: Arena, noise: _Noise) -> _Noise:
+    """The noise that its set leaves: a step of expectation and maximisation [dempster1977].
+
+    The set's values are not exactly known: draws of what is left keep the noise from being too small. What the car
+    differs by anyway stays in the noise: it is of the size of the simulator's own errors, for which no noise stands.
     """
-    found = None
-    along = {i for i, b in enumerate(arena.blocks) if arena.is_along(b)}
-    for metric in metrics:
-        for m in first_of(arena.blocks, metric, best, but=along):
-            members = (*best, m)
-            again = arena.weighed(_left(arena, metric, members))
-            score = _surprise(again) + _price(arena, members)
-            if score < least - CLEARLY:
-                least, found = score, again
-    return None if found is None else (least, found)
+    if not noise.members:
+        return _noise(arena, arena.weighed([[p.residual] for p in arena.parts]), ())
+    fit = fitted(arena, arena.tolerant(noise.gram), noise.members)
+    z = np.random.default_rng(SEED).standard_normal((PAIRS, len(fit.mean))) @ np.linalg.cholesky(fit.covariance).T
+    values = np.zeros((2 * PAIRS, arena.width))
+    values[:, fit.columns] = fit.mean + np.concatenate([z, -z])
+    left = [[p.residual - arena.made(i, v) for v in values] for i, p in enumerate(arena.parts)]
+    return _noise(arena, arena.weighed(left), noise.members)
 
 
-def _price(arena: Arena, members: Members) -> float:
-    return OPTIMISM * sum(len(arena.blocks[m].columns) for m in members)
-
-
-def _surprise(weighings: Sequence[Weighing]) -> float:
-    return sum(w.surprise for w in weighings)
-
-
-def _left(arena: Arena, metric: FloatArray, members: Members) -> list[FloatArray]:
-    """The residual of each part without what a set explains."""
-    fit = fitted(arena, metric, members)
-    out = []
-    for i, p in enumerate(arena.parts):
-        columns = np.concatenate([arena.drawn(i, arena.blocks[m]) for m in members])
-        out.append(p.residual - np.tensordot(fit.mean, columns, axes=1))
-    return out
+def _noise(arena: Arena, weighings: tuple[Weighing, ...], members: Members) -> _Noise:
+    used = np.diag(arena.tolerance) > 0.0
+    used[[c for m in members for c in arena.blocks[m].columns]] = True
+    gram = arena.inner(weighings, used)
+    forgiven = forgiving(gram, arena.tolerance)
+    gained = evidence_of(arena.blocks, forgiven.gram, members) + sum(arena.blocks[m].log_prior for m in members)
+    likely = gained - 0.5 * float(forgiven.gram[-1, -1]) - forgiven.room - sum(w.sharpness for w in weighings)
+    return _Noise(members, weighings, gram, likely)
 
 
 def rule(evidence: Evidence, blocks: Sequence[Block], gram: FloatArray) -> MayJoin:

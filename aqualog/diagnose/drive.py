@@ -42,6 +42,7 @@ A_X_MAX = 6.0  # [m/s^2]
 # [m/s^3] at steeper torque the samples show clocks, filters and tyre lag: 10 ms are 0.1 m/s^2
 JERK_MAX, JERK_S = 10.0, 0.1
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
+BRAKES, LONG_AGO_S = -0.8, 60.0  # [m/s^2], [s] braking, and when it has been long ago
 ROLLS_OUT = 0.15  # [m/s^2] a slope of 1.5 %, so that a road does not count as a brake
 
 
@@ -311,7 +312,12 @@ def _coordinates(
             depth[(course.t >= lane.start) & (course.t < lane.end)] = 0.5 * (lane.depth_left + lane.depth_right)
         out["water_depth"] = depth
     if "yaw_rate" in columns:
-        out["a_y"] = speed * columns["yaw_rate"]
+        turning = smooth(columns["yaw_rate"], dt, SPEED_S)
+        out |= {"a_y": speed * turning, "yaw_rate": turning}
+    slowing = out["a_x"] < BRAKES
+    if slowing.any():
+        last = np.maximum.accumulate(np.where(slowing, course.t, course.t[0] - LONG_AGO_S))
+        out["since_braking"] = np.minimum(course.t - last, LONG_AGO_S)
     if "steer_angle" in columns:
         out["steer_angle"] = course.steer
     if "ambient_temperature" in columns:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.spectrum import weighing
 from aqualog.model.term import Kind, Model
 
-__all__ = ["Evidence", "forgiving", "make_evidence", "recentred", "tolerant"]
+__all__ = ["Evidence", "Forgiven", "forgiving", "make_evidence", "recentred", "tolerant"]
 
 FARTHEST = 2.0  # standard deviations, beyond which a fault is likelier than an error of the file
 
@@ -98,7 +99,17 @@ def _drag_speed(drives: Sequence[Drive]) -> float:
     return float((v**3).sum() / max(float((v**2).sum()), 1e-9))
 
 
-def forgiving(gram: FloatArray, tolerance: FloatArray) -> FloatArray:
+class Forgiven(NamedTuple):
+    """Inner products (K + 1, K + 1) that forgive deviations.
+
+    `room`: half the log determinant of unit noise and deviations together.
+    """
+
+    gram: FloatArray
+    room: float
+
+
+def forgiving(gram: FloatArray, tolerance: FloatArray) -> Forgiven:
     """Inner products (K + 1, K + 1) in a metric that tolerates deviations of the covariance `tolerance` (K, K).
 
     No vehicle file is exact and no simulator is the car: a radius may be 0.03 % off, a tyre's curve a few percent. With
@@ -109,12 +120,14 @@ def forgiving(gram: FloatArray, tolerance: FloatArray) -> FloatArray:
     P = tolerance[np.ix_(k, k)]
     root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
     B = gram[:, k] @ root
-    return np.asarray(gram - B @ np.linalg.solve(np.eye(k.size) + root.T @ gram[np.ix_(k, k)] @ root, B.T))
+    C = np.linalg.cholesky(np.eye(k.size) + root.T @ gram[np.ix_(k, k)] @ root)
+    half = np.linalg.solve(C, B.T)
+    return Forgiven(np.asarray(gram - half.T @ half), float(np.log(np.diag(C)).sum()))
 
 
 def tolerant(evidence: Evidence, gram: FloatArray) -> FloatArray:
     """Inner products that forgive the usual errors of every parameter."""
-    return forgiving(gram, np.diag(evidence.forgiven**2))
+    return forgiving(gram, np.diag(evidence.forgiven**2)).gram
 
 
 def recentred(evidence: Evidence, model: Model) -> Model:
@@ -134,7 +147,7 @@ def recentred(evidence: Evidence, model: Model) -> Model:
         gram = np.zeros((evidence.count + 1, evidence.count + 1))
         for r, x, d in zip(evidence.residuals, evidence.signatures, evidence.drives, strict=True):
             quiet = r - sum((v * x[c] for c, v in theta.items()), np.zeros_like(r))
-            rows = weighing(quiet, d.mask, contrasts(d.channels)).rows(np.concatenate([x, r[None]]))
+            rows = weighing([quiet], d.mask, contrasts(d.channels)).rows(np.concatenate([x, r[None]]))
             gram += rows @ rows.T
         inner = gram[np.ix_(k, k)] + np.diag(evidence.forgiven[k] ** -2.0)
         theta = dict(zip(k.tolist(), np.linalg.solve(inner, gram[k, -1]).tolist(), strict=True))

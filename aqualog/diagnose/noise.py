@@ -46,10 +46,11 @@ class Noise:
     weights: FloatArray
 
     @property
-    def surprise(self) -> float:
-        """Negative log-likelihood of the residual that the noise was fitted to, without a constant."""
+    def sharpness(self) -> float:
+        """Half the log determinant of its covariance, without a constant."""
         sharp = np.log(np.abs(np.diag(self.shaping))).sum() + np.linalg.slogdet(self.rotation)[1]
-        return -float(sharp) * float((self.weights > 0.0).sum()) / len(self.taps)
+        used = self.weights > 0.0
+        return -float(sharp) * float(used.sum()) / len(self.taps) - float(np.log(self.weights[used]).sum())
 
     @property
     def count(self) -> float:

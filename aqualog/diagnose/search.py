@@ -21,6 +21,7 @@ from aqualog.diagnose.arena import Arena, known_only, make_arena
 from aqualog.diagnose.compete import Members, Posterior, compete, fitted
 from aqualog.diagnose.competition import COARSE, added, start
 from aqualog.diagnose.drive import Drive, led_by
+from aqualog.diagnose.elements import with_elements
 from aqualog.diagnose.evidence import Evidence, make_evidence, tolerant
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.records import Remainder, Significance
@@ -92,7 +93,7 @@ def search(
     Effects are asked for only if the test for any effect finds more than chance at this `level`.
     """
     tell("known effects against unknown forms", 0.45)
-    arena = make_arena(evidence, model)
+    arena = with_elements(make_arena(evidence, model))
     posterior = compete(arena)
     k = np.r_[np.arange(evidence.count), -1]
     scale = np.append(arena.sd[: evidence.count], 1.0)

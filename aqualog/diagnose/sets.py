@@ -16,7 +16,7 @@ __all__ = [
     "searched", "shares",
 ]  # fmt: skip
 
-WIDTH = 8  # sets that are carried on
+WIDTH = 8
 MOST = 4  # blocks in one set
 SWAPPED = 3  # sets in which every member is exchanged
 FEW = 4  # first candidates
@@ -128,7 +128,9 @@ def first_of(
     return [i for gain, i in sorted(gains, reverse=True)[:FEW] if gain > 0.0]
 
 
-def searched(blocks: Sequence[Block], inner: FloatArray, may_join: MayJoin) -> dict[Members, float]:
+def searched(
+    blocks: Sequence[Block], inner: FloatArray, may_join: MayJoin, *, width: int = WIDTH
+) -> dict[Members, float]:  # fmt: skip
     """Evidence of the sets that are visited: the best ones of each size carried on, then members exchanged.
 
     Parameters
@@ -138,6 +140,8 @@ def searched(blocks: Sequence[Block], inner: FloatArray, may_join: MayJoin) -> d
         Inner products of all columns, the residual last.
     may_join : callable
         Whether a block may join the set of a state.
+    width : int
+        Sets that are carried on.
     """
 
     def joining(state: State) -> list[tuple[int, float]]:
@@ -159,11 +163,11 @@ def searched(blocks: Sequence[Block], inner: FloatArray, may_join: MayJoin) -> d
                     new[key] = (total, state, i)
         for key, (total, _, _) in new.items():
             sets.setdefault(key, total)
-        top = sorted(new.values(), key=lambda x: -x[0])[:WIDTH]
+        top = sorted(new.values(), key=lambda x: -x[0])[:width]
         if not top or top[0][0] < max(sets.values()) - DIES:
             break
         states = [added(state, i, blocks[i]) for _, state, i in top]
-    for members in sorted(sets, key=lambda k: -sets[k])[:SWAPPED]:
+    for members in sorted(sets, key=lambda k: -sets[k])[: min(SWAPPED, width)]:
         for out in members if len(members) > 1 else ():
             state = start(inner)
             for m in members:

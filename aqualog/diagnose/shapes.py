@@ -15,7 +15,7 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.spline import Basis, basis
 
-__all__ = ["MECHANISMS", "Mechanism", "Shape", "shapes"]
+__all__ = ["ALONG", "MECHANISMS", "Mechanism", "Shape", "shapes"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +36,11 @@ class Mechanism:
     is_road: bool = False  # every road has it: no unknown form
 
 
-_CAR = (("v_x",), ("torque",), ("a_y",), ("steer_angle",), ("water_depth",), ("ambient_temperature",),
-        ("position",), ("t",), ("v_x", "torque"), ("v_x", "water_depth"))  # fmt: skip
+ALONG = ("t", "position")
+_CAR = (("v_x",), ("torque",), ("a_y",), ("yaw_rate",), ("steer_angle",), ("since_braking",), ("water_depth",),
+        ("ambient_temperature",), ("position",), ("t",), ("v_x", "torque"), ("v_x", "water_depth"))  # fmt: skip
 _SENSOR = (("v_x",), ("a_x",), ("t",), ("ambient_temperature",))
-_SLIP = (("torque",), ("v_x",), ("t",), ("a_y",), ("water_depth",))
+_SLIP = (("torque",), ("v_x",), ("t",), ("a_y",), ("yaw_rate",), ("since_braking",), ("water_depth",))
 MECHANISMS: tuple[Mechanism, ...] = (
     Mechanism("force", "a force on the car", "unit_force", "N", 150.0, 15.0, _CAR),
     Mechanism(
@@ -96,7 +97,7 @@ class Shape:
     @property
     def along(self) -> bool:
         """Whether it runs with time or place: no property that another drive would show."""
-        return bool({"t", "position"} & set(self.coordinates))
+        return bool(set(ALONG) & set(self.coordinates))
 
     def columns(self, response: FloatArray) -> FloatArray:
         """Residual-shaped columns (K, C, n) of a response (C, n) to a unit."""
@@ -111,7 +112,8 @@ def shapes(coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, ha
         if m.source not in has:
             continue
         for names in m.over:
-            if not all(n in coordinates for n in names):
+            # over time and place a smooth function is no other than slow noise: see `elements`
+            if not all(n in coordinates for n in names) or (not m.is_road and set(names) & set(ALONG)):
                 continue
             is_fine = m.is_road and names == ("position",)
             key = ("road" if is_fine else "", names)

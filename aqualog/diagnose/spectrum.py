@@ -7,6 +7,7 @@ column under noise alone follows its chi-squared distribution. Surrogates of the
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +31,8 @@ class Weighing:
     """Turns residual-shaped arrays (C, n) of one drive into rows whose inner products are twice log-likelihoods.
 
     `inverse` (F, C, C): roots of the inverse cross spectra of the whitened remainder, `used` (n,) its samples;
-    `surprise`: negative log-likelihood of the residual that it was made from, without a constant.
+    `sharpness`: half the log determinant of the noise's covariance, without a constant, so that half the inner product
+    of a residual with itself and this is its negative log-likelihood.
     """
 
     noise: Noise
@@ -38,7 +40,7 @@ class Weighing:
     used: BoolArray
     inverse: Complex
     size: int
-    surprise: float
+    sharpness: float
 
     @property
     def width(self) -> int:
@@ -58,29 +60,29 @@ class Weighing:
         return np.concatenate([lines.real, lines.imag]).reshape(-1, len(flat)).T
 
 
-def weighing(residual: FloatArray, mask: BoolArray, contrasts: FloatArray, noise: Noise | None = None) -> Weighing:
-    """The weighing by the noise of a residual (C, n) from which known effects have been subtracted."""
-    noise = noise or fit_noise(residual, mask, contrasts)
-    e = whitened(spectra(bridged(residual, mask)[None]), noise)[0].reshape(residual.shape)
+def weighing(residuals: Sequence[FloatArray], mask: BoolArray, contrasts: FloatArray) -> Weighing:
+    """The weighing by the noise of residuals (C, n) from which known effects have been subtracted.
+
+    Several residuals are draws of one: what is subtracted is not exactly known.
+    """
+    noise = fit_noise(residuals[0], mask, contrasts)
     used = np.asarray((noise.weights > 0.0).any(axis=0))
     count = int(used.sum())
     size = good_size(count)
-    raw = np.fft.rfft(e[:, used], size).T / np.sqrt(count)  # (F, C)
-    pilot = _power_law(np.abs(raw[1:]) ** 2)
+    e = whitened(spectra(bridged(np.array(residuals), mask)), noise).reshape(-1, *residuals[0].shape)
+    raw = np.fft.rfft(e[..., used], size).transpose(0, 2, 1) / np.sqrt(count)  # (draws, F, C)
+    pilot = _power_law((np.abs(raw[:, 1:]) ** 2).mean(axis=0))
     pilot = np.concatenate([pilot[:1], pilot])
-    flat = raw[1:] / pilot[1:]
-    cross = _averaged(flat[:, :, None] * flat[:, None, :].conj())
+    flat = raw[:, 1:] / pilot[1:]
+    cross = _averaged(np.einsum("dfi,dfj->fij", flat, flat.conj()) / len(flat))
     cross = np.concatenate([cross[:1].real.astype(complex), cross])
-    cross += 1e-6 * np.trace(cross, axis1=1, axis2=2).real[:, None, None] * np.eye(raw.shape[1])
+    cross += 1e-6 * np.trace(cross, axis1=1, axis2=2).real[:, None, None] * np.eye(raw.shape[-1])
     root = np.linalg.cholesky(cross) * pilot[:, :, None]
     inverse = np.linalg.inv(root).astype(np.complex128)
-    own = np.einsum("fij,fj->fi", inverse, raw)
-    lines = np.full(len(raw), 2.0)
+    lines = np.full(raw.shape[1], 2.0)
     lines[0] = 1.0
     logdet = 2.0 * np.log(np.abs(np.diagonal(root, axis1=1, axis2=2))).sum(axis=1)
-    share = count / size
-    surprise = 0.5 * share * float(lines @ (logdet + (np.abs(own) ** 2).sum(axis=1)))
-    return Weighing(noise, mask, used, inverse, size, noise.surprise + surprise)
+    return Weighing(noise, mask, used, inverse, size, noise.sharpness + 0.5 * count / size * float(lines @ logdet))
 
 
 def _lines(x: FloatArray, size: int) -> Complex:

@@ -89,7 +89,7 @@ def supported(evidence: Evidence) -> Evidence:
         return evidence
     gram = np.zeros((evidence.count + 1, evidence.count + 1))
     for r, s, m, d in zip(evidence.residuals, evidence.signatures, dry, evidence.drives, strict=True):
-        rows = weighing(r, m, contrasts(d.channels)).rows(np.concatenate([s, r[None]]))
+        rows = weighing([r], m, contrasts(d.channels)).rows(np.concatenate([s, r[None]]))
         gram += rows @ rows.T
     of_water = np.array([h.of_water for h in evidence.asked])
     sizes = np.array([len(c) for c in evidence.columns])

@@ -101,6 +101,7 @@ _COORDINATES: dict[str, tuple[str, str]] = {
     "drive_sign": ("driving or braking", "-"),
     "steer_angle": ("steer angle", "rad"),
     "yaw_rate": ("yaw rate", "rad/s"),
+    "since_braking": ("time since braking", "s"),
     "depth": ("water depth", "m"),  # of a campaign's runs, like the next ones
     "pressure": ("tyre pressure", "Pa"),
     "load": ("load", "kg"),
