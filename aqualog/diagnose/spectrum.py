@@ -60,12 +60,14 @@ class Weighing:
         return np.concatenate([lines.real, lines.imag]).reshape(-1, len(flat)).T
 
 
-def weighing(residuals: Sequence[FloatArray], mask: BoolArray, contrasts: FloatArray) -> Weighing:
+def weighing(
+    residuals: Sequence[FloatArray], mask: BoolArray, contrasts: FloatArray, noise: Noise | None = None
+) -> Weighing:  # fmt: skip
     """The weighing by the noise of residuals (C, n) from which known effects have been subtracted.
 
     Several residuals are draws of one: what is subtracted is not exactly known.
     """
-    noise = fit_noise(residuals[0], mask, contrasts)
+    noise = noise or fit_noise(residuals[0], mask, contrasts)
     used = np.asarray((noise.weights > 0.0).any(axis=0))
     count = int(used.sum())
     size = good_size(count)

@@ -31,7 +31,7 @@ def seen(car, asked, value, hidden):
     evidence = simulated([d], asked, Model(), lambda _t, _s: None)
     arena = known_only(arena_of(evidence, ()), ())
     without = [r - value * s[0] for r, s in zip(evidence.residuals, evidence.signatures, strict=True)]
-    weighings = arena.weighed(without)
+    weighings = arena.weighed([[r] for r in without])
     gram = arena.tolerant(arena.inner(weighings))
     measure = metric(arena, weighings, share=KNOWN, beside=(0,))
     r = refit(evidence, (0,), np.array([0.8 * value]), measure, Model())

@@ -74,7 +74,7 @@ def case(drives, sets):
     left = evidence.residuals
     for _ in range(3):
         # noise is what the best set leaves: an effect that is still there would pass for slow noise
-        scales = [weighing(left[p.drive][:, p.at], p.mask, contrasts(drives[0].channels)) for p in arena.parts]
+        scales = [weighing([left[p.drive][:, p.at]], p.mask, contrasts(drives[0].channels)) for p in arena.parts]
         measure = metric(arena, scales)
         chosen = [[at[k] for k in s] for s in sets]
         start = [np.zeros(sum(len(asked[m].free) for m in c)) for c in chosen]

@@ -99,7 +99,7 @@ def test_gains_of_noise_are_those_of_white_noise_once_it_is_weighed():
         lines = np.fft.rfft(rng.standard_normal(N))
         lines[80:160] *= 8.0
         y = (np.fft.irfft(lines, N) + slow(rng.standard_normal(N), 0.97))[None]
-        w = weighing(y, every, np.eye(1), white_noise(y, every, np.eye(1)))
+        w = weighing([y], every, np.eye(1), white_noise(y, every, np.eye(1)))
         x = np.array([[np.cos(2.0 * np.pi * k * np.arange(N) / N)] for k in (100, 110, 120, 130, 140)])
         rows = w.rows(np.concatenate([x, y[None]]))
         gains += [float((r @ rows[-1]) ** 2 / (r @ r)) for r in rows[:-1]]

@@ -34,7 +34,7 @@ def evidence():
 def test_names_and_values_allow_for_more_than_the_laws_of_water_may_be_off_by():
     b = evidence()
     arena = arena_of(b, ())
-    weighings = arena.weighed([p.residual for p in arena.parts])
+    weighings = arena.weighed([[p.residual] for p in arena.parts])
     known = metric(arena, weighings, share=KNOWN)
     np.testing.assert_array_equal(known.M, metric(arena, weighings).M)
     at = np.flatnonzero(b.tolerance > 0.0)

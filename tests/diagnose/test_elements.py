@@ -1,0 +1,61 @@
+"""Intervals and waves over time and place: found where they are, and not in slow noise."""
+
+import numpy as np
+import pytest
+
+from aqualog.diagnose.compete import compete
+from aqualog.diagnose.elements import with_elements
+from aqualog.diagnose.unexplained import unknown_forms
+from tests.diagnose.test_unexplained import arena, slow
+
+
+def trapezoid(t, begin, end, rise):
+    return np.clip((t - begin) / rise + 0.5, 0.0, 1.0) * np.clip((end - t) / rise + 0.5, 0.0, 1.0)
+
+
+def found(seed, force=None, **effects):
+    a = with_elements(arena(seed, force, **effects))
+    p = compete(a)
+    return a, p, unknown_forms(a, p, seed=1)
+
+
+@pytest.mark.parametrize("rise", [0.1, 16.0])
+def test_a_force_that_comes_and_goes(rise):
+    _, _, forms = found(11, lambda c: 220.0 * trapezoid(c["t"], 95.3, 161.7, rise))
+    assert [(r.mechanism, r.depends_on, r.unit) for r in forms] == [("force", ("t",), "N")]
+    r = forms[0]
+    truth = 220.0 * trapezoid(r.x[:, 0], 95.3, 161.7, rise)
+    assert np.sqrt(np.mean((r.f - truth) ** 2)) < 40.0
+    assert r.f.max() == pytest.approx(220.0, rel=0.2)
+    assert np.abs(r.f[r.x[:, 0] < 80.0]).max() < 1e-9
+
+
+def test_a_wave_of_the_road():
+    _, _, forms = found(12, lambda c: 150.0 * np.sin(2.0 * np.pi * c["position"] / 310.0 + 0.7))
+    assert [(r.mechanism, r.depends_on) for r in forms] == [("force", ("position",))]
+    r = forms[0]
+    truth = 150.0 * np.sin(2.0 * np.pi * r.x[:, 0] / 310.0 + 0.7)
+    assert np.corrcoef(r.f, truth)[0, 1] > 0.95
+
+
+@pytest.mark.parametrize("seed", [13, 14, 15, 16])
+def test_slow_noise_is_no_form(seed):
+    """Of the size of the forms above, with a memory of 20 s."""
+    gust = slow(np.random.default_rng([seed, 99]).standard_normal(2400), 0.995)
+    _, _, forms = found(seed, lambda c: 150.0 * gust)
+    assert forms == ()
+
+
+def test_a_known_effect_beside_an_interval():
+    _, p, forms = found(17, lambda c: 200.0 * trapezoid(c["t"], 60.0, 120.0, 0.1), aero_drag=0.5)
+    assert [r.depends_on for r in forms] == [("t",)]
+    assert p.marginal["aero_drag"] > 0.95
+
+
+def test_the_blocks_pay_for_all_that_were_tried():
+    a = with_elements(arena(18))
+    own = [b for b in a.blocks if "wave" in b.key or "interval" in b.key]
+    assert {b.key for b in own} == {"force(wave of t)", "force(wave of position)", "force(interval of t)"}
+    smooth = max(b.log_prior for b in a.blocks if b.kind == "shape" and b not in own)
+    assert max(b.log_prior for b in own) < smooth - 3.0
+    assert all(a.sd[list(b.columns)].tolist() == [150.0] * len(b.columns) for b in own)
