@@ -90,7 +90,7 @@ def not_calibrated(vehicle: Vehicle) -> str:
     known = (
         "" if provenance_of(vehicle, "mass").source == "measured" else ", best with the weighed mass (--fix mass=...)"
     )
-    return (
-        f"This vehicle file was not calibrated: {listed} {'is a guess' if len(keys) == 1 else 'are guesses'}; run "
-        f"`aqualog calibrate` on four or more dry drives{known}."
-    )
+    doubt = f"{listed} {'is a guess' if len(keys) == 1 else 'are guesses'}"
+    if not vehicle.provenance:
+        doubt = "it does not say where its values come from, so they count as exact"
+    return f"This vehicle file was not calibrated: {doubt}; run `aqualog calibrate` on four or more dry drives{known}."

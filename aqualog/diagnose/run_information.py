@@ -12,6 +12,7 @@ import numpy as np
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.diagnose.channels import block_step
+from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.drive import Drive, prepare
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in
@@ -96,15 +97,16 @@ def of_log(case: Case) -> FloatArray:
         kept = spectra(bridged(case.evidence.signatures[d][[x[0] for x in case.tolerances]], drive.mask))
         rows = np.concatenate([rows, whitened(kept, noise)])
         total = total + rows @ rows.T
-    return np.asarray(total)
+    return np.asarray(COARSE * total)
 
 
 def forecast(case: Case, log: FloatArray, run: FloatArray, times: int, group: FloatArray) -> Forecast:
     """Expected information of a run that is driven so many times.
 
     Under set i, the parameters and tolerances have a normal posterior after the log, and so have the data of the run.
-    Tolerances belong to the car, so the run shares them with the log. The data are drawn under each set in the space
-    that all rows span, and each set's density gives the posterior.
+    Tolerances of the car and its tyres are those of the log; those of a drive, as the wind, the run has for itself. The
+    data are drawn under each set in the space that all rows span, and each set's density gives the posterior. Of log
+    and run a share of the likelihood counts, as in the verdict.
 
     Parameters
     ----------
@@ -122,10 +124,15 @@ def forecast(case: Case, log: FloatArray, run: FloatArray, times: int, group: Fl
     unit = rng.standard_normal((DRAWS, at.shape[1]))
     means, roots = [], []
     wide = [sd for _, _, _, sd in case.tolerances]
+    anew = [h.effect.belongs == "drive" and h.effect.name not in case.effects for _, h, _, _ in case.tolerances]
     for i, (c, own) in enumerate(zip(case.rivals, case.columns, strict=True)):
         sd = [PRIOR_WIDTH * c.refit.members[m].parameter(n).sigma for m, n in c.refit.names] + wide
         spread = np.linalg.inv(log[np.ix_(own, own)] + np.diag(np.array(sd) ** -2.0))
-        means.append(at[own].T @ (spread @ log[own, i]) - at[i])
+        mean = spread @ log[own, i]
+        fresh = len(own) - len(anew) + np.flatnonzero(anew)
+        spread[fresh] = spread[:, fresh] = mean[fresh] = 0.0
+        spread[fresh, fresh] = np.array(sd)[fresh] ** 2
+        means.append(at[own].T @ mean - at[i])
         roots.append(np.linalg.cholesky(np.eye(at.shape[1]) + at[own].T @ spread @ at[own]))
     p = np.array([c.probability for c in case.rivals])
     p = p / p.sum()
@@ -163,7 +170,7 @@ def of_run(case: Case, run: Run, sensor: Sensor | None = None) -> FloatArray:
     asked = list({id(h): h for _, h, _, _ in case.tolerances}.values())
     shown = _signatures(drive, model, asked, residual(drive, model), run, each=False)
     rows = _weighed(case, drive, np.concatenate([np.array(left), *own, *shown]))
-    return np.asarray(rows @ rows.T)
+    return np.asarray(COARSE * rows @ rows.T)
 
 
 def _signatures(

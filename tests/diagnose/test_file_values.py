@@ -107,8 +107,8 @@ def test_what_to_calibrate_first():
     by_hand = replace(CAR, provenance={}, given=CAR.given - {"torque_gain"})
     assert calibrated_enough(by_hand) == ("torque_gain",)
     assert not_calibrated(by_hand) == (
-        "This vehicle file was not calibrated: torque_gain is a guess; run `aqualog calibrate` on four or more dry "
-        "drives, best with the weighed mass (--fix mass=...)."
+        "This vehicle file was not calibrated: it does not say where its values come from, so they count as exact; run "
+        "`aqualog calibrate` on four or more dry drives, best with the weighed mass (--fix mass=...)."
     )
     weighed = replace(by_hand, provenance={"mass": Provenance("measured"), "wheels.r_e_f": Provenance("guess")})
     assert not_calibrated(weighed) == (
