@@ -33,7 +33,7 @@ from aqualog.model.follow import FOLLOW_RATE, Course, follow
 from aqualog.model.scenario import Lane
 from aqualog.model.term import Model
 
-__all__ = ["Drive", "led_by", "prepare"]
+__all__ = ["Drive", "led_by", "prepare", "rolling_under"]
 
 BESIDE_S = 1.0  # [s] before and after what is left out
 GAP_S = 0.25  # [s] longer gaps are not bridged
@@ -170,6 +170,13 @@ def led_by(drive: Drive, model: Model) -> Drive:
     target wrong by a / FOLLOW_RATE: 0.2 m/s² of drag give 0.7 m/s, and the drag at that speed is 5 % off.
     """
     return replace(drive, course=_without_lag(drive.vehicle, replace(drive.course, v_x=drive.speed), model))
+
+
+def rolling_under(drive: Drive, model: Model) -> Drive:
+    """The drive without what is left out where a wheel floats in the simulation of a model."""
+    floats = floating({}, drive.speed, drive.vehicle, drive.course, (model,))
+    left_out = _widened(floats, BESIDE_S, drive.dt).astype(np.float64)
+    return replace(drive, mask=drive.mask & (block_means(left_out, drive.dt) == 0.0))
 
 
 def _without_lag(vehicle: Vehicle, course: Course, model: Model) -> Course:

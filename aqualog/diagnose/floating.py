@@ -7,7 +7,7 @@ of the model, and it also happens in drives without any hidden effect.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import Course, follow
 from aqualog.model.term import Model, Term
 
-__all__ = ["floating"]
+__all__ = ["RESERVED", "floating"]
 
 # slip of a wheel beyond its grip: a wet tyre's force has its largest value at 0.08 to 0.2 (D: 3 mu / C), and driving
 # without floating needs a fifth of that
@@ -30,10 +30,14 @@ RESERVE = 2.0
 # [s] a wheel that stood takes up speed again within one (D: 33 m/s in 0.65 s), but the led car has been turned by it,
 # nobody steers it back, and its yaw dies out in a few
 RECOVERY_S = 5.0
+RESERVED = (Model(), Model((Term(EFFECTS["contact_loss"], {"gain": RESERVE}),)))
 V_LEAST = 4.0  # [m/s] under the slip
 
 
-def floating(columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, course: Course) -> BoolArray:
+def floating(
+    columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, course: Course,
+    models: Sequence[Model] = RESERVED,
+) -> BoolArray:  # fmt: skip
     """Samples (n,) in which a wheel may float. All False on a dry course.
 
     Parameters
@@ -44,16 +48,17 @@ def floating(columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle,
         Measured velocity. [m/s]
     vehicle : Vehicle
     course : Course
-        The simulation is led along it as it is, and with twice the lost contact.
+        The simulation is led along it.
+    models : sequence of Model
+        Of it: as it is, and with twice the lost contact.
 
-    A span begins where a wheel loses its grip, measured or in either simulation. It ends when the stretch of water is
+    A span begins where a wheel loses its grip, measured or in any simulation. It ends when the stretch of water is
     over and the car has recovered. A wheel that floats a little less also floats a little later.
     """
     out: BoolArray = np.zeros(v.shape, dtype=bool)
     if not course.lanes:
         return out
-    more = Model((Term(EFFECTS["contact_loss"], {"gain": RESERVE}),))
-    for shown in (columns, follow(vehicle, course, Model()), follow(vehicle, course, more)):
+    for shown in (columns, *(follow(vehicle, course, m) for m in models)):
         if all(f"omega_{w}" in shown for w in WHEELS):
             speed = shown.get("v_x", v)
             # over a speed that is not too small: a standing car does not slip

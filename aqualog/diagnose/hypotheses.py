@@ -13,7 +13,8 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.channels import channel_values
 from aqualog.diagnose.drive import Drive, led_by
-from aqualog.diagnose.tolerances import STAND_IN, TOLERANCES, WATER_TOLERANCES
+from aqualog.diagnose.lanes import stretches
+from aqualog.diagnose.tolerances import LANE_TOLERANCES, STAND_IN, TOLERANCES
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
 from aqualog.model.term import Effect, Model, Need, Parameter, Term
@@ -23,6 +24,7 @@ __all__ = ["THREADS", "Hypothesis", "hypotheses", "residual", "signatures", "val
 THREADS = 2
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
 WORTH = 2.0  # tolerances
+MOST_LANES = 16  # that differ from each other; of more lanes, every 16th have a deviation in common
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +39,17 @@ class Hypothesis:
     @property
     def allowed(self) -> bool:
         """Whether it is a tolerance: taken into account but never reported."""
-        return self.effect in TOLERANCES or self.effect in WATER_TOLERANCES or self.effect is STAND_IN
+        return self.effect in TOLERANCES or self.lane is not None or self.effect is STAND_IN
+
+    @property
+    def lane(self) -> int | None:
+        """Lanes, by number, of which it is the tolerance."""
+        return round(self.fixed["lane"]) if "lane" in self.fixed else None
 
     @property
     def of_water(self) -> bool:
         """Whether it is an effect of water."""
-        return self.effect in WATER_TOLERANCES or self.effect.of_water
+        return self.lane is not None or self.effect.of_water
 
     @property
     def key(self) -> str:
@@ -106,8 +113,16 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
         for where in asked:
             out += [Hypothesis(effect, where, free, fixed) for fixed in effect.drive.variants(length)]
-    tolerances = (*TOLERANCES, *(WATER_TOLERANCES if wet else ()), *(() if torque else (STAND_IN,)))
-    out += [Hypothesis(e, None, ("by",)) for e in tolerances]
+    out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(() if torque else (STAND_IN,)))]
+    lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
+    # without torque there is no drag to test, nor one that differs
+    asked_at = {(h.effect.name, h.where) for h in out}
+    out += [
+        Hypothesis(e, None, ("by",), {"lane": k})
+        for k in range(lanes)
+        for source, e in LANE_TOLERANCES.items()
+        if source in asked_at
+    ]
     return tuple(out), untested
 
 
@@ -183,7 +198,8 @@ def signatures(
     """Change of the residual by one unit of each free parameter: (k, C, m) per hypothesis, around a model.
 
     Computed from differences of simulations along the drive. To first order, a hypothesis of a whole axle or car is the
-    sum of its wheels; unless `each` is set, it is not simulated again.
+    sum of its wheels; unless `each` is set, it is not simulated again. The tolerance of a lane is what its effect does
+    there.
     """
 
     def one(h: Hypothesis) -> FloatArray:
@@ -206,16 +222,25 @@ def signatures(
         tick()
         return np.array(out)
 
-    alone = {i: h for i, h in enumerate(asked) if each or not _sums(h)}
+    alone = {i: h for i, h in enumerate(asked) if h.lane is None and (each or not _sums(h))}
     with ThreadPoolExecutor(THREADS) as pool:
         done = dict(zip(alone, pool.map(one, alone.values()), strict=True))
     by_wheel: dict[tuple[str, str | None, tuple[tuple[str, float], ...]], FloatArray] = {
         (asked[i].effect.name, asked[i].where, tuple(asked[i].fixed.items())): x for i, x in done.items()
     }
+    sources = {e.name: at for at, e in LANE_TOLERANCES.items()}
+    for name, where in {sources[h.effect.name] for h in asked if h.lane is not None}:
+        if (name, where, ()) not in by_wheel:
+            by_wheel[name, where, ()] = one(Hypothesis(EFFECTS[name], where, (EFFECTS[name].parameters[0].name,)))
+    number = stretches(drive)
     out = []
     for i, h in enumerate(asked):
         if i in done:
             out.append(done[i])
+            continue
+        if h.lane is not None:
+            there = (number > 0) & ((number - 1) % MOST_LANES == h.lane)
+            out.append(by_wheel[*sources[h.effect.name], ()][:1] * there)
             continue
         parts = [by_wheel[h.effect.name, w, tuple(h.fixed.items())] for w in _parts(h)]
         out.append(np.sum(parts, axis=0))

@@ -19,8 +19,6 @@ from aqualog.model.term import Model
 __all__ = ["KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "metric", "refit"]
 
 KNOWN = 0.25  # share of the tolerances that values and intervals take into account
-# factor on the tolerances of the water laws, which are guesses; naming a cause must not depend on their accuracy
-DOUBT = 2.0
 PRIOR_WIDTH = 3.0  # the prior is this much wider than the effect's: it only keeps huge, cancelling pairs apart
 SHRINK = (1.0, 0.5, 0.2)
 ROUNDS = 6
@@ -84,9 +82,9 @@ def metric(
     """Inner products under noise and a share of the tolerances, as in `Arena.tolerant`.
 
     Sets are compared with the full tolerances. Values are estimated with the share `KNOWN`: vehicle files usually err
-    by less than the tolerances, and a fit that tolerates its own effect would look for it where it hardly shows. The
-    tolerances of the water laws always count `DOUBT` times, whatever the share. The car's drive-to-drive spread and
-    the errors of the file's own values count in full, because this drive deviates by them too.
+    by less than the tolerances, and a fit that tolerates its own effect would look for it where it hardly shows. Lanes
+    differ however well a file is known: theirs always count in full. So do the car's drive-to-drive spread and the
+    errors of the file's own values, because this drive deviates by them too.
 
     The columns `beside`, whose values are estimated, are an exception, and so is every effect that looks the same.
     Their spread is not part of the metric; it is added to the variance of the estimated values (`Metric.apart`). Both
@@ -101,7 +99,7 @@ def metric(
     known = np.where([k in sought for k in evidence.kinds], 0.0, evidence.spread)
     known[list(beside)] = 0.0
     owner = {c: h for h, columns in zip(evidence.asked, evidence.columns, strict=True) for c in columns}
-    shares = np.array([DOUBT if owner[c].of_water else share for c in range(evidence.count)])
+    shares = np.array([share if owner[c].lane is None else 1.0 for c in range(evidence.count)])
     sd = np.maximum(shares * evidence.tolerance, known)
     k = np.flatnonzero(sd > 0.0)
     pieces = []

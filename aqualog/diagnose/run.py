@@ -29,6 +29,7 @@ from aqualog.diagnose.grade import Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, value_in, with_values
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
+from aqualog.diagnose.on_water import around_water
 from aqualog.diagnose.outcome import Outcome, conclude, with_causes
 from aqualog.diagnose.probability import SURE
 from aqualog.diagnose.records import Agreement, Consequence, Diagnosis, Gain, ResidualView, Verdict
@@ -121,7 +122,7 @@ def diagnose(
     outcome = joined(outcome, seen)
     threshold = max(found.calibration.threshold, HEARD)
     sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.inflation, threshold)
-    before = list(evidence.residuals) if road is None else [_led(d, bare) for d in ready]
+    before = [residual(d, model) for d in ready] if road is None else [_led(d, bare) for d in ready]
     after = before if extended.terms == bare.terms else [_led(d, extended) for d in ready]
     gained = None
     if extended.terms != bare.terms:
@@ -185,7 +186,8 @@ def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
         bare = Model((*bare.terms, *(t for t in moved.terms if t not in model.terms)))
         model, ready = moved, [led_by(d, moved) for d in ready]
         evidence = simulated(ready, asked, model, tell)
-    return _Setting(ready, model, bare, road, asked, untested, supported(evidence), notes)
+    evidence = supported(around_water(evidence, model))
+    return _Setting(list(evidence.drives), model, bare, road, asked, untested, evidence, notes)
 
 
 def _moved(moved: Model, model: Model) -> tuple[str, ...]:

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aqualog.core.notation import AXLES
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import Arena, known_only, make_arena
@@ -24,6 +23,7 @@ from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import with_elements
 from aqualog.diagnose.evidence import Evidence, make_evidence, tolerant
 from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
+from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
 from aqualog.diagnose.subsets import compatible, imitations
@@ -187,7 +187,7 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     def as_blocks(own: Sequence[int]) -> Members:
         return tuple(sorted(by_hypothesis[h] for h in own)) if all(h in by_hypothesis for h in own) else ()
 
-    chosen += [as_blocks(own) for own in _twins(evidence, _effects(arena, best)) + _of_water(evidence)]
+    chosen += [as_blocks(own) for own in _twins(evidence, _effects(arena, best)) + [(i,) for i in of_water(evidence)]]
     for own in imitations(evidence.asked, _effects(arena, best)):
         if compatible(evidence, own):
             equal.add(as_blocks(own))
@@ -205,7 +205,10 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
 
     with ThreadPoolExecutor(THREADS) as pool:
         done = dict(zip(chosen, pool.map(one, chosen), strict=True))
-    out = {m: o for m, o in done.items() if o is not None} | {(): Option((), 0.0)}
+    # water is not linear: without any effect, the simulator may differ from what signatures say of it
+    y = measure.rows([residual(d, model)[None] for d in evidence.drives])
+    bare = nothing - 0.5 * float(measure.inner(y, y)[0, 0])
+    out = {m: o for m, o in done.items() if o is not None} | {(): Option((), bare)}
     if best in out and best:
         # what the simulator says more or less of the best set than its signatures, it would say of the others too
         shift = out[best].evidence - linear[best]
@@ -230,8 +233,15 @@ def _levelled(
                 continue
             worse = (o.refit.loss - o.refit.unlikely) - (top.refit.loss - top.refit.unlikely)
             gained = top.evidence - 0.5 * max(worse, 0.0)
-        elif top is not None and _about_water(evidence, arena, members) and _about_water(evidence, arena, best):
-            gained = min(top.evidence, o.evidence + FORM * max(top.evidence, 0.0)) if members != best else o.evidence
+        elif (
+            # an effect in place of another; one more has no better claim than its evidence
+            top is not None
+            and members != best
+            and len(members) <= len(best)
+            and _about_water(evidence, arena, members)
+            and _about_water(evidence, arena, best)
+        ):
+            gained = min(top.evidence, o.evidence + FORM * max(top.evidence, 0.0))
         out.append(replace(o, evidence=gained))
     return out
 
@@ -276,13 +286,6 @@ def _twins(evidence: Evidence, own: Sequence[int]) -> list[tuple[int, ...]]:
     return out
 
 
-def _of_water(evidence: Evidence) -> list[tuple[int, ...]]:
-    """Effects of water on the whole car or a side: refitted on every wet log, whatever the signatures predict."""
-    return [
-        (i,) for i, h in enumerate(evidence.asked) if h.of_water and not h.allowed and h.where not in AXLES
-    ]  # fmt: skip
-
-
 def _about_water(evidence: Evidence, arena: Arena, members: Members) -> bool:
     return any(evidence.asked[h].of_water for h in _effects(arena, members))
 
@@ -310,7 +313,11 @@ def sharpened(found: Found, option: Option, model: Model) -> tuple[Refit | None,
     led = replace(evidence, drives=tuple(led_by(d, option.refit.model) for d in evidence.drives))
     measure = metric(found.arena, found.posterior.weighings, share=KNOWN, beside=columns)
     again = refit(led, own, _off(option.refit, model), measure, model)
-    best = option.refit if again is None or again.at_bound else again
     known = metric(found.arena, found.posterior.weighings, share=KNOWN)
-    y = known.rows([r[None] for r in best.residuals])
-    return best, float(known.inner(y, y)[0, 0]) + best.unlikely
+
+    def loss(r: Refit) -> float:
+        y = known.rows([x[None] for x in r.residuals])
+        return float(known.inner(y, y)[0, 0]) + r.unlikely
+
+    best = option.refit if again is None or again.at_bound else min(option.refit, again, key=loss)
+    return best, loss(best)

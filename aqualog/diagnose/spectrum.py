@@ -47,6 +47,11 @@ class Weighing:
         """Length of a row."""
         return int(2 * self.inverse.shape[0] * self.inverse.shape[1])
 
+    def surprise(self, residual: FloatArray) -> float:
+        """Negative log-likelihood of a residual (C, n), without a constant."""
+        row = self.rows(residual[None])[0]
+        return self.sharpness + 0.5 * float(row @ row)
+
     def rows(self, x: FloatArray) -> FloatArray:
         """Arrays (k, C, n) as rows (k, M)."""
         out = np.empty((len(x), self.width))

@@ -17,12 +17,11 @@ from itertools import combinations
 import numpy as np
 
 from aqualog.core.notation import AXLES, WHEELS
-from aqualog.core.records import BoolArray
 from aqualog.diagnose.any_effect import gains_of
-from aqualog.diagnose.channels import block_step, contrasts
-from aqualog.diagnose.drive import Drive
+from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.evidence import Evidence, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.diagnose.lanes import stretches
 from aqualog.diagnose.spectrum import weighing
 from aqualog.model.effects import EFFECTS
 
@@ -30,7 +29,6 @@ __all__ = ["TWINS", "compatible", "imitations", "supported"]
 
 TWINS = 0.1  # share of its energy that an effect must keep beside its twin, to stand in one set with it
 SHOWN = 4.0  # of twice the log-likelihood off the water: two standard deviations
-BESIDE_S = 1.0  # [s] after a stretch, in which the rear axle and the speed still have it
 LEAST = 300  # samples off the water that the check needs at the least
 
 
@@ -84,7 +82,7 @@ def supported(evidence: Evidence) -> Evidence:
     """
     if not any(d.course.lanes for d in evidence.drives):
         return evidence
-    dry = [_off_water(d) for d in evidence.drives]
+    dry = [d.mask & (stretches(d) == 0) for d in evidence.drives]
     if sum(int(m.sum()) for m in dry) < LEAST or any(m.sum() < LEAST // 4 for m in dry):
         return evidence
     gram = np.zeros((evidence.count + 1, evidence.count + 1))
@@ -94,11 +92,3 @@ def supported(evidence: Evidence) -> Evidence:
     of_water = np.array([h.of_water for h in evidence.asked])
     sizes = np.array([len(c) for c in evidence.columns])
     return replace(evidence, barred=(gains_of(evidence, tolerant(evidence, gram)) < SHOWN * sizes) & ~of_water)
-
-
-def _off_water(drive: Drive) -> BoolArray:
-    """Usable samples without water, nor shortly after it. (m,)"""
-    wet = drive.coordinates.get("water_depth", np.zeros(drive.mask.size))[: drive.mask.size] > 0.0
-    k = round(BESIDE_S / block_step(drive.dt))
-    late = np.convolve(wet.astype(np.float64), np.ones(k + 1), "full")[: wet.size] > 0.5
-    return drive.mask & ~late

@@ -1,50 +1,183 @@
-"""The laws of water are forgiven by what their sources leave open; what water does is refitted on every wet log."""
+"""Lanes of water may differ from each other; what water does is sought near its most likely size and refitted."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pytest
 
-from aqualog.diagnose.arena import arena_of
+from aqualog.core.notation import WHEELS
+from aqualog.diagnose import search
+from aqualog.diagnose.arena import arena_of, known_only
 from aqualog.diagnose.compete import compete
-from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.hypotheses import hypotheses
-from aqualog.diagnose.refit import DOUBT, KNOWN, metric
-from aqualog.diagnose.search import _of_water, simulated
+from aqualog.diagnose.drive import prepare, rolling_under
+from aqualog.diagnose.floating import BEYOND_GRIP
+from aqualog.diagnose.hypotheses import hypotheses, signatures
+from aqualog.diagnose.lanes import stretches
+from aqualog.diagnose.on_water import around_water, of_water
+from aqualog.diagnose.refit import KNOWN, metric, refit
+from aqualog.diagnose.search import FORM, Found, Option, _levelled, _refitted, sharpened, simulated
 from aqualog.diagnose.subsets import supported
-from aqualog.diagnose.tolerances import WATER_TOLERANCES
+from aqualog.diagnose.tolerances import LANE_TOLERANCES
+from aqualog.model.follow import follow
+from aqualog.model.scenario import Lane
 from aqualog.model.term import Model
 from tests.diagnose.test_drive import CAR, NOISY, signals, term
-from tests.diagnose.test_floating import wet
+from tests.diagnose.test_floating import LANES, wet
+
+SHALLOW = tuple(
+    Lane(t, t + 6.0, in_metres=False, depth_left=d, depth_right=1.1 * d)
+    for t, d in ((4.0, 1e-3), (14.0, 1.4e-3), (24.0, 1.2e-3), (36.0, 0.7e-3), (60.0, 0.9e-3), (72.0, 1.3e-3))
+)
 
 
-def test_the_laws_of_water_are_asked_about_on_water_alone():
-    names = {t.name for t in WATER_TOLERANCES}
-    on_water, _ = hypotheses([prepare(wet(), CAR, "a")], Model())
-    assert {h.effect.name for h in on_water if h.allowed and h.of_water} == names
-    dry, _ = hypotheses([prepare(signals(), CAR, "a")], Model())
-    assert not any(h.of_water for h in dry)
+def quiet(_text, _share):
+    pass
+
+
+def asked_of(d):
+    return [h for h in hypotheses([d], Model())[0] if h.of_water]
 
 
 @cache
 def evidence():
-    d = prepare(wet(sensors=NOISY), CAR, "a")
-    return simulated([d], [h for h in hypotheses([d], Model())[0] if h.of_water], Model(), lambda _t, _s: None)
+    return on_water()
 
 
-def test_names_and_values_allow_for_more_than_the_laws_of_water_may_be_off_by():
+def on_water(*terms, lanes=LANES):
+    d = prepare(wet(*terms, sensors=NOISY, lanes=lanes), CAR, "a")
+    return simulated([d], asked_of(d), Model(), quiet)
+
+
+def column(b, key):
+    return next(c[0] for h, c in zip(b.asked, b.columns, strict=True) if h.key == key)
+
+
+def test_each_lane_may_differ_on_water_alone():
+    d = prepare(wet(), CAR, "a")
+    assert stretches(d).max() == len(LANES)
+    own = [(h.effect, h.lane) for h in asked_of(d) if h.allowed]
+    assert own == [(e, k) for k in range(len(LANES)) for e in LANE_TOLERANCES.values()]
+    dry, _ = hypotheses([prepare(signals(), CAR, "a")], Model())
+    assert not any(h.of_water for h in dry)
+
+
+def test_the_tolerance_of_a_lane_is_what_its_effect_does_there():
+    b = evidence()
+    number = stretches(b.drives[0])
+    whole = b.signatures[0][column(b, "contact_loss@f")]
+    for k in range(len(LANES)):
+        at = next(
+            c[0] for h, c in zip(b.asked, b.columns, strict=True)
+            if h.lane == k and h.effect is LANE_TOLERANCES["contact_loss", "f"]
+        )  # fmt: skip
+        np.testing.assert_array_equal(b.signatures[0][at], whole * (number == k + 1))
+
+
+def test_a_lane_needs_no_other_hypothesis():
+    b = evidence()
+    own = [h for h in b.asked if h.lane == 1]
+    alone = signatures(b.drives[0], Model(), own, base=b.residuals[0])
+    for h, s in zip(own, alone, strict=True):
+        k = next(i for i, o in enumerate(b.asked) if o is h)
+        np.testing.assert_allclose(s, b.signatures[0][list(b.columns[k])], atol=1e-12)
+
+
+def test_lanes_differ_in_full_however_well_a_file_is_known():
     b = evidence()
     arena = arena_of(b, ())
     weighings = arena.weighed([[p.residual] for p in arena.parts])
     known = metric(arena, weighings, share=KNOWN)
-    np.testing.assert_array_equal(known.M, metric(arena, weighings).M)
     at = np.flatnonzero(b.tolerance > 0.0)
-    A = weighings[0].rows(b.signatures[0][at] * (DOUBT * b.tolerance[at])[:, None, None])
+    lane = np.array([h.lane is not None for h, c in zip(b.asked, b.columns, strict=True) for _ in c])
+    share = np.where(lane, 1.0, KNOWN)[at]
+    A = weighings[0].rows(b.signatures[0][at] * (share * b.tolerance[at])[:, None, None])
     np.testing.assert_allclose(known.A, A)
+
+
+@pytest.mark.parametrize("gain", [0.4, 1.6])
+def test_a_lost_contact_is_sought_near_its_size(gain):
+    """A straight line from the file's contact misses it; one from about its own size does so by less than half."""
+    far = on_water(term("contact_loss", gain=gain), lanes=SHALLOW)
+    near = around_water(far, Model())
+    mask = far.drives[0].mask
+
+    def value(b):
+        slips = [i for i, n in enumerate(b.drives[0].channels) if n.startswith("slip")]
+        x = b.residuals[0][slips][:, mask].ravel()
+        s = b.signatures[0][column(b, "contact_loss")][slips][:, mask].ravel()
+        return 1.0 + float(s @ x) / float(s @ s)
+
+    assert abs(value(far) - gain) > 0.15
+    assert abs(value(near) - gain) < 0.5 * abs(value(far) - gain)
+
+
+def test_axles_differ_by_as_much_wherever_signatures_stand():
+    b = on_water(term("water_drag", gain=2.2), lanes=SHALLOW)
+    near = around_water(b, Model())
+    assert not np.array_equal(near.residuals[0], b.residuals[0])
+    for key in ("water_drag@f", "water_drag"):  # in the balance of forces drag is a straight line
+        s, t = (x.signatures[0][column(b, key)][0, b.drives[0].mask] for x in (b, near))
+        assert float(s @ t) / float(s @ s) == pytest.approx(1.0, abs=0.05)
+
+
+def test_where_the_most_likely_water_lets_a_wheel_float_nothing_is_judged():
+    d, floats = evidence().drives[0], Model((term("contact_loss", gain=5.0),))
+    less = rolling_under(d, floats)
+    shown = follow(CAR, d.course, floats)
+    slip = np.abs(np.array([shown[f"omega_{w}"] * CAR.r_e(w) for w in WHEELS]) / shown["v_x"] - 1.0).max(axis=0)
+    beyond = slip.reshape(-1, 10).max(axis=1) > 1.2 * BEYOND_GRIP
+    assert (d.mask & beyond).any()
+    assert not (less.mask & beyond).any()
+    assert not (less.mask & ~d.mask).any()
+    assert rolling_under(d, Model()).mask.sum() == d.mask.sum()
+
+
+def test_a_drive_without_water_stays_as_it_is():
+    d = prepare(signals(sensors=NOISY), CAR, "a")
+    b = simulated([d], [h for h in hypotheses([d], Model())[0] if h.key == "aero_drag"], Model(), quiet)
+    assert around_water(b, Model()) is b
+    assert supported(b) is b
+
+
+def test_one_effect_of_water_more_has_only_its_own_evidence():
+    b = evidence()
+    arena = arena_of(b, ())
+    by_key = {x.key: i for i, x in enumerate(arena.blocks)}
+    best, other = (by_key["contact_loss"],), (by_key["water_drag"],)
+    both, axles = (tuple(sorted(x)) for x in (best + other, (by_key["contact_loss@f"], by_key["contact_loss@r"])))
+    options = {m: Option(m, e) for m, e in (((), -5.0), (best, 20.0), (other, 12.0), (both, 16.0), (axles, 16.0))}
+    levelled = {o.members: o.evidence for o in _levelled(b, arena, options, best, set(), Model())}
+    assert levelled == {(): -5.0, best: 20.0, other: pytest.approx(12.0 + FORM * 20.0), both: 16.0, axles: 16.0}
+
+
+def test_the_files_own_water_is_judged_by_the_simulator():
+    """Signatures that stand elsewhere say too much or too little of it."""
+    b = evidence()
+    elsewhere = b.residuals[0] + 0.3 * b.signatures[0][column(b, "contact_loss")]
+    for residuals, differs in (((elsewhere,), True), (b.residuals, False)):
+        own = replace(b, residuals=residuals)
+        arena = known_only(arena_of(own, ()), [])
+        options = {o.members: o.evidence for o in _refitted(own, arena, compete(arena), Model())}
+        assert abs(options[()]) > 1.0 if differs else abs(options[()]) < 1e-6
+
+
+def test_a_sharper_refit_that_fits_worse_is_left(monkeypatch):
+    b = evidence()
+    arena = arena_of(b, ())
+    posterior = compete(arena)
+    i = next(i for i, x in enumerate(arena.blocks) if x.key == "contact_loss")
+    measure = metric(arena, posterior.weighings)
+    own = refit(b, [arena.blocks[i].tag], np.zeros(1), measure, Model())
+    worse = replace(own, values=own.values + 0.5, residuals=tuple(3.0 * r for r in own.residuals))
+    monkeypatch.setattr(search, "refit", lambda *_: worse)
+    found = Found(None, None, None, arena, posterior)
+    assert sharpened(found, Option((i,), 0.0, own), Model())[0] is own
 
 
 def test_each_thing_that_water_does_is_refitted():
     b = evidence()
-    keys = {b.asked[i].key for (i,) in _of_water(b)}
+    keys = {b.asked[i].key for i in of_water(b)}
     assert {"water_drag", "contact_loss"} <= keys
     assert keys <= {"water_drag", "contact_loss", "track_clearing", "uneven_water@left", "uneven_water@right"}
 
@@ -52,15 +185,9 @@ def test_each_thing_that_water_does_is_refitted():
 def test_what_acts_everywhere_is_barred_where_only_the_water_shows_it():
     d = prepare(wet(term("aero_drag", delta_drag_area=0.3), sensors=NOISY), CAR, "a")
     asked = [h for h in hypotheses([d], Model())[0] if h.of_water or h.key in ("aero_drag", "payload_mass")]
-    b = supported(simulated([d], asked, Model(), lambda _t, _s: None))
+    b = supported(simulated([d], asked, Model(), quiet))
     barred = {h.key for h, x in zip(b.asked, b.barred, strict=True) if x}
     assert barred == {"payload_mass"}
     arena = arena_of(b, ())
     assert "payload_mass" not in {x.key for x in arena.blocks}
     assert "aero_drag" in {arena.blocks[m].key for m in compete(arena).best}
-
-
-def test_a_dry_drive_bars_nothing():
-    d = prepare(signals(sensors=NOISY), CAR, "a")
-    b = simulated([d], [h for h in hypotheses([d], Model())[0] if h.key == "aero_drag"], Model(), lambda _t, _s: None)
-    assert supported(b) is b
