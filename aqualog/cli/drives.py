@@ -10,7 +10,7 @@ from aqualog.cli.frame import Output, Run, command
 if TYPE_CHECKING:
     from aqualog.face.diagnose import Diagnosis
 
-__all__ = ["calibrate", "diagnose", "evaluate"]
+__all__ = ["calibrate", "diagnose", "evaluate", "validate"]
 
 
 @command(
@@ -172,6 +172,44 @@ def _written(result: Diagnosis, model: Path | None, page: Path | None) -> tuple[
     if page is not None:
         result.write_page(page, force=True)
     return result, [*result.notes, *(f"written: {path}" for path in (model, page) if path is not None)]
+
+
+@command(
+    "logs:validated vehicle:believed model:known signals dbc method:validity boundaries why out:page rate "
+    "correct_offsets cache data force"
+)
+def validate(run: Run, method: str, boundaries: Path | None, why: bool, out: Path | None) -> Output:
+    """Judge whether the simulation of a car is valid on measured drives: in one sentence, and why not.
+
+    By the methods of ISO 19364 [iso19364_2016] (boundaries in cross plots) and ISO/TS 18571 [iso18571_2024] (a rating),
+    on another test than theirs.
+    The simulation follows the measured torque and steering. Three drives or more that repeat each other give the
+    tolerances. Then the verdict of `aqualog diagnose` follows, which takes about a minute; --no-why leaves it out.
+
+    \b
+    Examples:
+      aqualog validate drive.mf4 --vehicle car.toml --no-why
+      aqualog validate run1.mf4 run2.mf4 run3.mf4 --vehicle car.toml -o validity.html
+      aqualog validate drive.mf4 --vehicle car.toml --method 18571 --boundaries own.toml --json
+    """
+    from aqualog.core.errors import ExitCode
+    from aqualog.face.drives import NothingUsableError, grouped
+    from aqualog.face.validate import validate
+
+    run.need_vehicle("it is what the simulation believes")
+    others = [p for p in (run.model, boundaries) if p is not None]
+    drive = run.drive([out] if out is not None else [], others=others)
+    try:
+        with run.hearing("nothing was written") as hear:
+            result = validate(
+                grouped(run.logs, drive), drive.vehicle, method=method, boundaries=boundaries, model=run.model,
+                why=why, progress=hear,
+            )  # fmt: skip
+    except NothingUsableError:  # each reason was reported
+        return Output(code=int(ExitCode.NOTHING_USABLE))
+    if out is not None:
+        result.write_page(out, force=True)
+    return Output(result, [*result.notes, *([f"the page is {out}"] if out is not None else [])])
 
 
 @command(

@@ -189,6 +189,20 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "bootstrap": _option(
         bool, True, "--bootstrap/--no-bootstrap", help="Without: quicker, the test by its formula alone."
     ),
+    "logs:validated": _argument(
+        list[str], "Logs, each argument a drive of its own; a folder is one drive of several files.", "LOG..."
+    ),
+    "method:validity": _option(
+        str, "boundary", "--method", metavar="NAME",
+        help="Which the sentence goes by: boundary (ISO 19364) or 18571 (ISO/TS 18571). The page has both.",
+    ),
+    "boundaries": _file(
+        "Tolerances of the cross plots (TOML); default: those of three repeated drives, else aqualog's own.",
+        "--boundaries",
+    ),
+    "why": _option(
+        bool, True, "--why/--no-why", help="Diagnose the drives too; without it the answer takes seconds."
+    ),
     "labels": _file(
         "Labels (CSV start_s,end_s,effect,wheel), or a folder with NAME.csv for each log NAME; without lines: no "
         "water.", "--labels",

@@ -89,6 +89,7 @@ DRIVES = {
     "doctor": ("doctor", MF4, *CAR),
     "cache": ("cache",),
     "calibrate": ("calibrate", MONDAY, FRIDAY, *CAR),
+    "validate": ("validate", MONDAY, *CAR, "--no-why"),
 }
 
 

@@ -27,6 +27,7 @@ CALLS = {
     "report": (("campaign.toml", "--jobs", 1, "-o", "page"), 0, ""),
     "calibrate": (("short.csv", *CAR), 4, "error: "),
     "diagnose": (("short.csv", *CAR), 4, "error: "),
+    "validate": (("short.csv", *CAR, "--no-why"), 4, "error: "),
     "evaluate": (("lane_drive.mf4",), 2, "no vehicle"),
     "simulate": (("scenario.toml", "-o", "made.csv"), 0, "(seed 1)"),
     "figures": (("2.1", "-o", "figures"), 0, "2.1"),

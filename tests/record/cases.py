@@ -141,6 +141,10 @@ ONE_DRIVE = (
         f"diagnose {S}/loaded_monday.parquet {CAR} --holdout {S}/loaded_friday.parquet --surrogates 9 --json "
         "-o {o}/model.toml --page {o}/page.html",
     ),
+    Case("validate", f"validate {S}/lane_drive.mf4 {CAR} --no-why --json"),
+    Case(
+        "validate_text", f"validate {S}/loaded_monday.parquet {S}/loaded_friday.parquet {CAR} --no-why --method 18571"
+    ),
     Case("diagnose_text", f"diagnose {S}/loaded_friday.parquet {CAR} --no-bootstrap"),
     Case("diagnose_model", f"diagnose {S}/loaded_monday.parquet {CAR} --model given/model.toml --no-bootstrap --json"),
     Case("diagnose_wet", f"diagnose {S}/lane_drive.mf4 {CAR} --no-bootstrap --json"),
