@@ -213,7 +213,7 @@ def validate(run: Run, method: str, boundaries: Path | None, why: bool, out: Pat
 
 
 @command(
-    "logs:campaign vehicle:of_logs signals dbc labels by:tables rivals roc thresholds tune gate junit out:page "
+    "logs:campaign vehicle:of_logs signals dbc labels by:tables rivals rival roc thresholds tune gate junit out:page "
     "data force"
 )
 def evaluate(
@@ -221,6 +221,7 @@ def evaluate(
     labels: Path | None,
     by: str,
     rivals: bool,
+    rival: list[str] | None,
     roc: bool,
     tune: Path | None,
     gate: list[str] | None,
@@ -239,15 +240,18 @@ def evaluate(
       aqualog evaluate campaign.toml --tune thresholds.toml
       aqualog evaluate drive.mf4 --vehicle car.toml --labels labels.csv --json
       aqualog evaluate dry/*.mf4 --vehicle car.toml --labels dry.csv
+      aqualog evaluate campaign.toml --rival own=ESP.AquaWarn --rival 'easyrain=DAI.Level>=2'
       aqualog evaluate campaign.toml --gate 'joint_cusum.recall>=0.9' --junit g.xml
     """
     from aqualog.core.errors import ConfigError, ExitCode
     from aqualog.evaluate.gates import parse_gates
     from aqualog.evaluate.judge import ODD_LABELS
+    from aqualog.evaluate.logged import parse_rivals
     from aqualog.face.arguments import refuse_existing
     from aqualog.face.evaluate import evaluate, inputs_of
 
-    parse_gates(gate or (), with_rivals=rivals)
+    logged = [r.name for r in parse_rivals(rival or ())]
+    parse_gates(gate or (), with_rivals=rivals, logged=logged)
     if junit is not None and not gate:
         raise ConfigError("--junit without --gate", expected="--gate 'joint_cusum.recall>=0.9'")
     given = inputs_of(run.logs, run.vehicle, map=run.signals, dbc=run.dbc, labels=labels)
@@ -255,8 +259,8 @@ def evaluate(
     refuse_existing([p for p in (tune, out, junit) if p], force=run.force, sources=own)
     with run.hearing("nothing was written") as hear:
         found = evaluate(
-            run.logs, run.vehicle, labels=labels, map=run.signals, dbc=run.dbc, by=by, rivals=rivals, roc=roc,
-            thresholds=run.thresholds, tune=tune is not None, progress=hear,
+            run.logs, run.vehicle, labels=labels, map=run.signals, dbc=run.dbc, by=by, rivals=rivals,
+            rival=rival or (), roc=roc, thresholds=run.thresholds, tune=tune is not None, progress=hear,
         )  # fmt: skip
     found = found.gated(gate or ())
     has_records = bool(found.evaluation.records)

@@ -211,6 +211,11 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
         str, "", "--by", help="Tables by configuration: tyre,depth,pressure,manoeuvre,... of the campaign."
     ),
     "rivals": _flag("Also the methods of the prior art.", "--rivals"),
+    "rival": _option(
+        list[str] | None, None, "--rival", metavar="NAME=CHANNEL",
+        help="A detector that is in the log: true or false, or a number with a level, NAME=CHANNEL>=LEVEL; may be "
+        "repeated.",
+    ),
     "roc": _flag("Also at thresholds from a quarter to four times.", "--roc"),
     "tune": _file(
         "Propose thresholds on some drives, report them on the others, and write them here.", "--tune"

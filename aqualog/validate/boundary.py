@@ -1,4 +1,4 @@
-"""Boundaries about a simulated curve in a cross plot, by the formula of ISO 19364 [iso19364_2016], and what lies beyond them.
+"""Boundaries about a simulated curve in a cross plot (ISO 19364 [iso19364_2016]), and what lies beyond them.
 
 The boundary's point is where an ellipse of the half-axes eps_x, eps_y about the curve's point touches a line along the
 curve: top and bottom are the edges of what this ellipse sweeps along the curve. So a measured point lies within them
