@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray, Signals
 
-__all__ = ["NO_LANE", "Side", "Span", "mean_over", "spans_of", "wet_side_of"]
+__all__ = ["NO_LANE", "Side", "Span", "mean_over", "spans_of", "tracks_of", "wet_side_of"]
 
 Span = tuple[float, float]
 """Begin and end of a stretch from the log's first sample. [s]"""
@@ -17,7 +18,7 @@ Side = Literal["left", "right"]
 NO_LANE = "no watered lane in the log: no on_water, no water depth, and no lane_start_s and lane_end_s in the campaign"
 JOINED_S = 0.5  # [s] a shorter gap in the label is a flicker of the gate, not the lane's end
 LEAST_S = 0.2  # [s] a shorter stretch is no lane
-SHARE = 0.5  # a track has at most this share of the other one's water if one side is dry
+SHARE = 0.1  # of the deeper track's water; with less the other track is dry
 WET = 1e-4  # [m] less is a damp road
 
 
@@ -46,19 +47,20 @@ def spans_of(signals: Signals, given: Span | None = None) -> tuple[Span, ...]:
     return tuple(s for s in spans if s[1] - s[0] >= LEAST_S)
 
 
-def wet_side_of(signals: Signals, span: Span, depths: tuple[float, float] | None = None) -> Side | None:
-    """Return the side that is in water while the other one is dry; None if nothing says so.
+def tracks_of(signals: Signals, span: Span, depths: tuple[float, float] | None = None) -> tuple[float, float] | None:
+    """Return the water in the left and right track [m]: `depths` of the campaign, else the log's; None without both."""
+    if depths is not None and all(math.isfinite(d) for d in depths):
+        return depths
+    t = signals.array("t")
+    inside = (t >= span[0]) & (t <= span[1])
+    columns = [signals.array(f"water_depth_{s}")[inside] for s in ("left", "right")]
+    if not all(np.isfinite(c).any() for c in columns):
+        return None
+    return float(np.nanmedian(columns[0])), float(np.nanmedian(columns[1]))
 
-    `depths` are those of the left and right track [m] according to the campaign; else those of the log count.
-    """
-    if depths is None:
-        t = signals.array("t")
-        inside = (t >= span[0]) & (t <= span[1])
-        columns = [signals.array(f"water_depth_{s}")[inside] for s in ("left", "right")]
-        if not all(np.isfinite(c).any() for c in columns):
-            return None
-        depths = (float(np.nanmedian(columns[0])), float(np.nanmedian(columns[1])))
-    left, right = depths
+
+def wet_side_of(left: float, right: float) -> Side | None:
+    """Return the side that is in water [m] while the other one is dry, or has at most a tenth of it; None: neither."""
     if max(left, right) <= WET or min(left, right) > SHARE * max(left, right):
         return None
     return "left" if left > right else "right"

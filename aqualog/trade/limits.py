@@ -58,6 +58,7 @@ class CurveLimits:
     v_change: float
     a_y_share: float
     least_time: float
+    a_y_zero: float
     passes: float
     speed_step: float
 
@@ -73,6 +74,10 @@ class BrakingLimits:
     lost: float
     depth_low: float
     depth_high: float
+    temperature: float
+    temperature_reference: float
+    texture_low: float
+    texture_high: float
     runs: float
     cv: float
 

@@ -14,7 +14,7 @@ import numpy as np
 from aqualog.core.notation import AXLES
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.trade.lane import NO_LANE, Side, Span, mean_over, spans_of, wet_side_of
+from aqualog.trade.lane import NO_LANE, Side, Span, mean_over, spans_of, tracks_of, wet_side_of
 from aqualog.trade.limits import StraightLimits, defaults
 from aqualog.trade.run_checks import Looked, look
 from aqualog.trade.speeds import references
@@ -149,8 +149,7 @@ def straight_run(
         return replace(bare, reasons=(what,))
     side, notes = _side(signals, span, depths, axle, before, on_lane)
     if side is None:
-        what = "the wet side is not known: no depth of the left and right track, and both wheels turn alike"
-        return replace(bare, reasons=(what,))
+        return replace(bare, reasons=notes)
     wet, dry = (f"{axle}{s[0]}" for s in (side, _OTHER[side]))
     speeds = references(signals, vehicle, axle, dry, on_lane, before)
     if not speeds.names[0]:
@@ -258,22 +257,28 @@ def _lacking(signals: Signals, vehicle: Vehicle, axle: str) -> tuple[str, ...]:
 def _side(
     signals: Signals, span: Span, depths: tuple[float, float] | None, axle: str, before: BoolArray, on_lane: BoolArray
 ) -> tuple[Side | None, tuple[str, ...]]:
-    """Return the wet side: that of the depths, else that of the wheel that turns faster on the lane."""
-    known = wet_side_of(signals, span, depths)
-    if known is not None:
-        return known, ()
+    """Return the wet side and notes, or None and why it is not known.
+
+    It is that of the depths, else that of the wheel that turns faster on the lane.
+    """
+    tracks = tracks_of(signals, span, depths)
+    if tracks is not None:
+        side = wet_side_of(*tracks)
+        told = " and ".join(f"{1e3 * d:.1f}" for d in tracks)
+        return side, () if side else (f"no side is dry beside a wet one: {told} mm of water left and right",)
     left, right = (signals.array(f"omega_{w}") for w in AXLES[axle])
     with np.errstate(divide="ignore", invalid="ignore"):
         quotient = np.where((left > 1.0) & (right > 1.0), left / right, np.nan)
     dry, wet = quotient[before & np.isfinite(quotient)], quotient[on_lane & np.isfinite(quotient)]
+    unknown = ("the wet side is not known: no depth of the left and right track, and both wheels turn alike",)
     if dry.size < 2 or wet.size < 2:
-        return None, ()
+        return None, unknown
     away = np.log(wet / float(dry.mean()))
     most = float(away[np.argmax(np.abs(away))])
     if abs(most) < _SLIP_LEAST:
-        return None, ()
-    side: Side = "left" if most > 0.0 else "right"
-    return side, (f"the {side} side is taken as the wet one, because its driven wheel turns faster on the lane",)
+        return None, unknown
+    faster: Side = "left" if most > 0.0 else "right"
+    return faster, (f"the {faster} side is taken as the wet one, because its driven wheel turns faster on the lane",)
 
 
 def _yaw_term(signals: Signals, vehicle: Vehicle, speed: FloatArray, side: Side) -> FloatArray:

@@ -98,6 +98,14 @@ REASONS = {
     "one wheel": (lambda: {k: x for k, x in straight().items() if k != "omega_fr"}, "omega_fr is not in the log"),
     "slow log": (lambda: {k: x[::20] for k, x in straight().items()}, "at least 10 needed"),
     "no lane": (lambda: {k: x for k, x in straight().items() if "water" not in k}, "no watered lane"),
+    "no dry wheel": (
+        lambda: straight() | {"water_depth_right": np.full(1500, 7e-3), "water_depth_left": np.full(1500, 7e-3)},
+        "no side is dry beside a wet one: 7.0 and 7.0 mm",
+    ),
+    "side unknown": (
+        lambda: {k: x for k, x in straight(v_15=300.0).items() if not k.startswith("water")},
+        "the wet side is not known",
+    ),
     "no speed": (lambda: {k: x for k, x in straight().items() if k not in ("v_x", "omega_rr")}, "no speed on the lane"),
 }
 
