@@ -38,7 +38,8 @@ class CurveSet:
     v : array (m,)
         Mean entry speed of each step. [m/s]
     least, mean, dry : array (m,)
-        Concave fits of least and mean lateral acceleration in the trough, and means of the dry one. [m/s²]
+        Concave fits of least and mean lateral acceleration in the trough, and means of the dry one. [m/s²] The fits end
+        at the first step at which the least one is 0; beyond it the steps' means stand.
     result, ci, estimate
         The number of `RESULTS` with its interval, and the same with its variance.
     v_greatest, v_half, v_zero : (value, interval)
@@ -111,7 +112,7 @@ def curve_set(
     if not good.v.size:
         return CurveSet(empty, empty, empty, empty, passes=len(passes), notes=("no pass is valid",))
     v = good.means(good.v)
-    curves = _curves(good, v, good.least, good.mean)
+    curves = _curves(good, v, good.least, good.mean, limits.a_y_zero)
     own = _read(v, *curves, good.means(good.dry), limits, result, between)
     draws = _draws(good, v, limits, result, between)
     spread = draws.std(axis=0, ddof=1) if draws.size else np.full(4, np.nan)
@@ -149,10 +150,21 @@ def _speeds(passes: Sequence[CurvePass], limits: CurveLimits) -> FloatArray:
     return good.means(good.v) if good.v.size else good.v
 
 
-def _curves(good: _Steps, v: FloatArray, least: FloatArray, mean: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Fit both curves; the passes stand at their step's mean speed, so that no fit looks beyond its ends."""
-    at = v[np.searchsorted(np.unique(good.step), good.step)]
-    return concave_fit(at, least, v), concave_fit(at, mean, v)
+def _curves(
+    good: _Steps, v: FloatArray, least: FloatArray, mean: FloatArray, zero: float
+) -> tuple[FloatArray, FloatArray]:
+    """Fit both curves up to the step at which the least acceleration is 0: from there on it need not be concave.
+
+    The passes stand at their step's mean speed, so that no fit looks beyond its ends.
+    """
+    means = [good.means(x) for x in (least, mean)]
+    gone = np.flatnonzero(means[0] <= zero)
+    end = int(gone[0]) + 1 if gone.size else v.size
+    place = np.searchsorted(np.unique(good.step), good.step)
+    is_fitted = place < end
+    fits = [concave_fit(v[place[is_fitted]], x[is_fitted], v[:end]) for x in (least, mean)]
+    found = [np.concatenate([f, m[end:]]) for f, m in zip(fits, means, strict=True)]
+    return found[0], found[1]
 
 
 def _read(
@@ -196,7 +208,9 @@ def _draws(good: _Steps, v: FloatArray, limits: CurveLimits, result: CurveResult
             y = getattr(good, name)
             level = np.concatenate([np.full(m.size, y[m].mean()) for m in members])
             made[name][own] = level + away[name][drawn]
-        found.append(_read(v, *_curves(good, v, made["least"], made["mean"]), dry, limits, result, between))
+        found.append(
+            _read(v, *_curves(good, v, made["least"], made["mean"], limits.a_y_zero), dry, limits, result, between)
+        )
     return np.array(found)
 
 

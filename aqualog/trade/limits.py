@@ -88,7 +88,6 @@ class SetLimits:
 
     cv: float
     runs: float
-    level: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,7 +56,8 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
         )
     if run.is_crossing and not np.isfinite(run.v[int(run.stop) : int(run.stop) + 2]).all():
         reasons.append("the speed is missing at the crossing")
-    a_x, source = _acceleration(signals, run.v, t, t_stop, limits.a_x_window)
+    begin = max(t_stop - limits.a_x_window, run.span[0] - limits.dry)
+    a_x, source = _acceleration(signals, run.v, (t > begin) & (t <= t_stop))
     if math.isnan(a_x):
         reasons.append(f"the acceleration {where} is not known")
     elif a_x < limits.a_x_least:
@@ -105,9 +106,9 @@ def torque_fall(torque: FloatArray, within: BoolArray, samples: int) -> float:
     return float(np.max(1.0 - x[highest > 0.0] / highest[highest > 0.0]))
 
 
-def _acceleration(signals: Signals, v: FloatArray, t: FloatArray, t_stop: float, window: float) -> tuple[float, str]:
-    """Return the mean acceleration [m/s²] before a time, and a note where it is that of the speed."""
-    inside = (t > t_stop - window) & (t <= t_stop)
+def _acceleration(signals: Signals, v: FloatArray, inside: BoolArray) -> tuple[float, str]:
+    """Return the mean acceleration of a stretch [m/s²], and a note where it is that of the speed."""
+    t = signals.array("t")
     a_x = signals.array("a_x")[inside]
     if a_x.size and np.isfinite(a_x).mean() >= 0.5:
         return float(np.nanmean(a_x)), ""

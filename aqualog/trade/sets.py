@@ -64,7 +64,7 @@ def summarised(values: Sequence[float], bounds: Sequence[float], runs: int, limi
             return Summary(runs, 0, notes=tuple(notes))
         notes.append("no run reached its value: the mean lies above what is given, by how much is not known")
         return Summary(runs, valid, valid, above=min(bounds), notes=tuple(notes))
-    found = censored_mean(np.array(values), np.array(bounds), level=limits.level)
+    found = censored_mean(np.array(values), np.array(bounds))
     if bounds and math.isnan(found.mean):
         notes.append(f"one value and {len(bounds)} censored: they give no mean")
     elif bounds:
