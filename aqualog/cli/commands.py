@@ -78,6 +78,11 @@ COMMANDS = {
     "evaluate": Command(
         "drives", "Compare what the detectors find with what was there: recall, latency, false alarms, confusion."
     ),
+    "test": Command(
+        "trade",
+        "Tyre tests as the trade publishes them: straight and curved aquaplaning, wet braking.",
+        function="test_app",
+    ),
     "simulate": Command("thesis", "Simulate one drive of a scenario file, or the drives of a measuring campaign."),
     "figures": Command("thesis", "Make figures of the thesis again, from runs, with what they say about its claims."),
     "reproduce": Command(

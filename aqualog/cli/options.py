@@ -210,6 +210,25 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "by:tables": _option(
         str, "", "--by", help="Tables by configuration: tyre,depth,pressure,manoeuvre,... of the campaign."
     ),
+    "by:sets": _option(
+        str, "", "--by", metavar="KEYS",
+        help="Keys of a set: tyre,pressure,depth,load,... of the campaign. Default: those in which the runs differ.",
+    ),
+    "control": _option(
+        str, "", "--control", metavar="TYRE", help="Tyre of the control sets, with which the others are compared."
+    ),
+    "index": _option(float, 100.0, "--index", help="Index of the control.", min=1.0, max=1000.0),
+    "radius": _option(
+        float | None, None, "--radius", help="Radius of the circle in m: passes on another one do not count.", min=5.0,
+        max=2000.0,
+    ),
+    "result": _option(str, "mean", "--result", help="min, mean or area: what is compared.", metavar="NAME"),
+    "v_from": _option(float, 80.0, "--from", help="Speed at which a stop begins, km/h.", min=1.0, max=300.0),
+    "v_to": _option(float, 20.0, "--to", help="Speed at which it ends, km/h.", min=1.0, max=300.0),
+    "coefficients": _file("Coefficients of the wet grip index (TOML), from your copy.", "--coefficients"),
+    "limits": _file("Thresholds of the tests that differ from the defaults (TOML).", "--limits"),
+    "out:test": _file("Folder for the document, sets and runs as CSV, and the page.", metavar="DIR"),
+    "page:test": _file("Page (HTML).", "--page"),
     "rivals": _flag("Also the methods of the prior art.", "--rivals"),
     "rival": _option(
         list[str] | None, None, "--rival", metavar="NAME=CHANNEL",

@@ -84,7 +84,7 @@ _ALL = [
     _number("fault", "start_s", "s", None, 0.0, _DAY, "begin; must be given"),
     _number("fault", "end_s", "s", None, 0.0, _DAY, "end; must be given"),
     _text("fault", "kind", "missing", ", ".join(FAULT_KINDS)),
-    _text("steering", "kind", "sine", "sine"),
+    _text("steering", "kind", "sine", "sine, or hold: the angle rises within half a period and stays"),
     _number("steering", "amplitude_deg", "deg", None, -45.0, 45.0, "mean road-wheel angle; first half a lobe to the "
             "left"),
     _number("steering", "steering_wheel_amplitude_deg", "deg", None, -720.0, 720.0, "over the `steering_ratio`"),
@@ -390,7 +390,7 @@ def _steering(table: Table, vehicle: Vehicle | None, speed: Profile, duration: f
     if not table.values:
         return None
     _check_names(table, "steering")
-    _choice(table, "kind", ("sine",))
+    kind: Any = _choice(table, "kind", ("sine", "hold"))
     period = _required(table, "period_s")
     start = _value(table, "start_s")
     name = _one_of(table, ("amplitude_deg", "steering_wheel_amplitude_deg"))
@@ -411,7 +411,7 @@ def _steering(table: Table, vehicle: Vehicle | None, speed: Profile, duration: f
             f"{name} = {degrees:g} asks for {lateral:.3g} m/s² to the side at {v * 3.6:.3g} km/h, more than "
             f"{LATERAL_LIMIT:g}{hint}",
         )
-    return Steering(angle, period, start)
+    return Steering(angle, period, start, kind)
 
 
 def _excitation(table: Table, vehicle: Vehicle | None) -> Excitation | None:

@@ -86,11 +86,15 @@ class Kick:
 
 @dataclass(frozen=True, slots=True)
 class Steering:
-    """Sinusoidal steering: amplitude of the mean road-wheel angle [rad], period [s], start [s]."""
+    """Steering by an angle over time: amplitude of the mean road-wheel angle [rad], period [s], start [s].
+
+    `sine` swings about straight ahead. `hold` rises within half a period and stays: a circle.
+    """
 
     amplitude: float
     period_s: float
     start_s: float = 1.0
+    kind: Literal["sine", "hold"] = "sine"
 
 
 @dataclass(frozen=True, slots=True)

@@ -152,6 +152,8 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
         phase = np.maximum(t - steering.start_s, 0.0) * (2.0 * np.pi / steering.period_s)
         # half a lobe of half the height first, so that the heading swings about straight ahead
         steer = steering.amplitude * np.sin(phase) * np.where(phase < np.pi, 0.5, 1.0)
+        if steering.kind == "hold":
+            steer = steering.amplitude * 0.5 * (1.0 - np.cos(np.minimum(phase, np.pi)))
     split = (
         _profile(scenario.split_rear, t) if scenario.split_rear else np.full(n + 1, scenario.vehicle.torque_split_rear)
     )
