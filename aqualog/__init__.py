@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from aqualog.face.inspect import doctor, inspect
     from aqualog.face.simulate import simulate
     from aqualog.face.slip_slope import slip_slope
+    from aqualog.face.trade import tyre_test
     from aqualog.model.term import Model
 
 __version__ = "0.14.0"
@@ -53,6 +54,7 @@ _FACE = {
     "inspect": "aqualog.face.inspect",
     "diagnose": "aqualog.face.diagnose",
     "simulate": "aqualog.face.simulate",
+    "tyre_test": "aqualog.face.trade",
     "Drive": "aqualog.face.drive",
     "Signals": "aqualog.core.records",
     "Vehicle": "aqualog.core.vehicle",
@@ -88,6 +90,7 @@ __all__ = [
     "simulate",
     "slip_slope",
     "thesis",
+    "tyre_test",
 ]
 
 
