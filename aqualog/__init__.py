@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from aqualog.face.inspect import doctor, inspect
     from aqualog.face.simulate import simulate
     from aqualog.face.slip_slope import slip_slope
+    from aqualog.face.trade import tyre_test
     from aqualog.face.validate import validate
     from aqualog.model.term import Model
 
@@ -55,6 +56,7 @@ _FACE = {
     "diagnose": "aqualog.face.diagnose",
     "simulate": "aqualog.face.simulate",
     "validate": "aqualog.face.validate",
+    "tyre_test": "aqualog.face.trade",
     "Drive": "aqualog.face.drive",
     "Signals": "aqualog.core.records",
     "Vehicle": "aqualog.core.vehicle",
@@ -90,6 +92,7 @@ __all__ = [
     "simulate",
     "slip_slope",
     "thesis",
+    "tyre_test",
     "validate",
 ]
 

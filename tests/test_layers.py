@@ -117,6 +117,7 @@ def test_detectors_read_no_truth_and_no_labels():
                 "campaign",
                 "diagnose",
                 "cache",
+                "test",
                 "plan",
                 "doctor",
                 "help",

@@ -57,9 +57,11 @@ def censored_mean(values: FloatArray, bounds: FloatArray, *, level: float = 0.95
     if not c.size:
         if not m:
             return Censored(math.nan, NOWHERE, math.nan)
-        mean = float(x.mean())
         if m == 1:
-            return Censored(mean, NOWHERE, math.nan)
+            return Censored(float(x[0]), NOWHERE, math.nan)
+        if float(np.ptp(x)) == 0.0:  # the mean of equal floats need not be that float
+            return Censored(float(x[0]), (float(x[0]), float(x[0])), 0.0)
+        mean = float(x.mean())
         sd = float(x.std(ddof=1))
         half = student_quantile(0.5 + level / 2.0, m - 1.0) * sd / math.sqrt(m)
         return Censored(mean, (mean - half, mean + half), sd)
