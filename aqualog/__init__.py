@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from aqualog.face.slip_slope import slip_slope
     from aqualog.face.trade import tyre_test
     from aqualog.face.validate import validate
+    from aqualog.face.watch import watch
     from aqualog.model.term import Model
 
 __version__ = "0.14.0"
@@ -56,6 +57,7 @@ _FACE = {
     "diagnose": "aqualog.face.diagnose",
     "simulate": "aqualog.face.simulate",
     "validate": "aqualog.face.validate",
+    "watch": "aqualog.face.watch",
     "tyre_test": "aqualog.face.trade",
     "Drive": "aqualog.face.drive",
     "Signals": "aqualog.core.records",
@@ -94,6 +96,7 @@ __all__ = [
     "thesis",
     "tyre_test",
     "validate",
+    "watch",
 ]
 
 

@@ -83,6 +83,10 @@ COMMANDS = {
         "Tyre tests as the trade publishes them: straight and curved aquaplaning, wet braking.",
         function="test_app",
     ),
+    "watch": Command(
+        "trade",
+        "Measure the runs of a tyre test as their logs arrive in a folder: a line and a page that renews itself.",
+    ),
     "simulate": Command("thesis", "Simulate one drive of a scenario file, or the drives of a measuring campaign."),
     "figures": Command("thesis", "Make figures of the thesis again, from runs, with what they say about its claims."),
     "reproduce": Command(

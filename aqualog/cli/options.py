@@ -229,6 +229,14 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "limits": _file("Thresholds of the tests that differ from the defaults (TOML).", "--limits"),
     "out:test": _file("Folder for the document, sets and runs as CSV, and the page.", metavar="DIR"),
     "page:test": _file("Page (HTML).", "--page"),
+    "folder:watched": _argument(
+        Path, "Folder in which logs arrive, also of the network, with the folders below it.", "FOLDER"
+    ),
+    "campaign:watched": _file("Campaign file; its runs name the logs to come.", "--campaign", metavar="CAMPAIGN.toml"),
+    "kind": _option(str, "straight", "--test", help="straight, curve or braking.", metavar="NAME"),
+    "out:watch": _file("Page that renews itself (HTML); default beside the campaign file: NAME.watch.html."),
+    "once": _flag("Measure what is there, and end.", "--once"),
+    "every": _option(float, 1.0, "--every", help="Seconds between two looks.", min=0.1, max=3600.0, metavar="S"),
     "rivals": _flag("Also the methods of the prior art.", "--rivals"),
     "rival": _option(
         list[str] | None, None, "--rival", metavar="NAME=CHANNEL",

@@ -9,7 +9,7 @@ import typer
 
 from aqualog.cli.frame import Output, Run, command
 
-__all__ = ["braking", "curve", "straight", "test_app"]
+__all__ = ["braking", "curve", "straight", "test_app", "watch"]
 
 test_app = typer.Typer(
     help="Tyre tests as the trade publishes them: straight and curved aquaplaning, wet braking.", no_args_is_help=True,
@@ -109,3 +109,46 @@ def _test_of(run: Run, kind: str, targets: tuple[Path | None, Path | None], **op
     if not found.test.valid:
         return Output(found, notes, code=int(ExitCode.NOTHING_USABLE))
     return Output(found, notes)
+
+
+@command("folder:watched campaign:watched kind by:sets limits out:watch once every data")
+def watch(
+    run: Run, folder: Path, campaign: Path | None, kind: str, by: str, limits: Path | None, out: Path | None,
+    once: bool, every: float,
+) -> Output:  # fmt: skip
+    """Measure the runs of a tyre test as their logs arrive in a folder: a line and a page that renews itself.
+
+    A log is measured when it has not changed for two seconds, once, whatever it is called. Its line says value, valid
+    or why not, and of its set the valid runs, the CV and what is still missing. Damaged logs are named, and measured
+    when they are copied again. The folder may be away for a while, and the campaign file may change. Ctrl-C ends it,
+    prints the sets, and leaves the page.
+
+    \b
+    Examples:
+      aqualog watch /net/track/monday --campaign campaign.toml --test straight
+      aqualog watch runs --campaign campaign.toml --test braking -o monday.html --every 5
+      aqualog watch runs --campaign campaign.toml --once --json
+    """
+    import sys
+
+    from aqualog.cli.console import clean_line
+    from aqualog.core.errors import ConfigError, ExitCode
+    from aqualog.face.watch import watch
+
+    if campaign is None:
+        raise ConfigError("no --campaign", expected="a campaign file: car, signals, and the runs to come")
+    page = campaign.with_suffix(".watch.html") if out is None else out
+    stream = sys.stderr if run.json else sys.stdout
+
+    def say(line: str) -> None:
+        stream.write(f"{clean_line(line)}\n")
+        stream.flush()
+
+    with run.hearing() as hear:
+        found = watch(
+            folder, campaign, kind, by=by, limits=limits, page=page, once=once, every_s=every, say=say, progress=hear
+        )
+    notes = [*found.notes, f"the page is {page}"]
+    if not once:
+        return Output(found, notes, code=int(ExitCode.INTERRUPTED))
+    return Output(found, notes, code=None if found.test.entries else int(ExitCode.NOTHING_USABLE))

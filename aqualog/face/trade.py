@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from aqualog.trade.entry import Kind
     from aqualog.trade.evaluation import TradeTest
 
-__all__ = ["TyreTest", "tyre_test"]
+__all__ = ["TyreTest", "kind_of", "tyre_test"]
 
 _KINDS = ("straight", "curve", "braking")
 _INSIDE = ("onset_missing", "curve", "configuration")  # parts of a row that are no cells of a table
@@ -153,7 +153,7 @@ def tyre_test(
     from aqualog.trade.limits import defaults
     from aqualog.trade.logs import Request, measure_logs, names_of_runs
 
-    hear, test_kind = listener(progress), _kind(kind)
+    hear, test_kind = listener(progress), kind_of(kind)
     dbc = of_kind.pop("dbc", ())
     given = _given(test_kind, of_kind)
     own = inputs if isinstance(inputs, CampaignInputs) else CampaignInputs(inputs, vehicle=vehicle, map=map, dbc=dbc)
@@ -179,7 +179,13 @@ def tyre_test(
     )  # fmt: skip
 
 
-def _kind(kind: str) -> Kind:
+def kind_of(kind: str) -> Kind:
+    """Return the kind of a test.
+
+    Raises
+    ------
+    ConfigError
+    """
     found: Any = text_of(kind, "kind")
     if found not in _KINDS:
         raise ConfigError(f'no test "{found[:40]}"', expected=", ".join(_KINDS))

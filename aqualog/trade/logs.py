@@ -26,7 +26,7 @@ from aqualog.trade.limits import Limits
 from aqualog.trade.onset import Onset, onset_of
 from aqualog.trade.straight import straight_runs
 
-__all__ = ["Measured", "Request", "measure_logs", "measure_signals", "names_of_runs"]
+__all__ = ["Measured", "Request", "measure_log", "measure_logs", "measure_signals", "names_of_runs"]
 
 _HERE = 4  # for so few logs no processes are started
 
@@ -35,7 +35,10 @@ Report = Callable[[int, int, int], None]
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is measured: the test, its thresholds, the radius of the circle [m] and the speeds of a stop [m/s]."""
+    """What is measured: the test, its thresholds, the radius of the circle [m] and the speeds of a stop [m/s].
+
+    `whole_only`: a log that is cut gives nothing, as while it is still being copied.
+    """
 
     kind: Kind
     limits: Limits
@@ -43,6 +46,7 @@ class Request:
     v_from: float = 80.0 / 3.6
     v_to: float = 20.0 / 3.6
     with_onset: bool = True
+    whole_only: bool = False
 
 
 class Measured(NamedTuple):
@@ -91,10 +95,10 @@ def measure_logs(
         report(len(found), len(tasks), sum(isinstance(x, str) for x in found.values()))
 
     if len(tasks) > _HERE and jobs > 1:
-        work_on(tasks, _one, jobs=jobs, record=record)
+        work_on(tasks, measure_log, jobs=jobs, record=record)
     else:
         for index, task in tasks.items():
-            record(index, _one(*task))
+            record(index, measure_log(*task))
     return {index: found[index] for index in sorted(found)}
 
 
@@ -103,14 +107,17 @@ def names_of_runs(configured: Configured) -> list[str]:
     return [name_of(configured.campaign, run.logs) for run in configured.campaign.runs]
 
 
-def _one(
+def measure_log(
     run: Run, vehicle: Vehicle, signal_map: SignalMap, dbc: Sequence[Path], request: Request
-) -> Measured | str:  # fmt: skip
+) -> Measured | str:
+    """Read and measure the log of one run; a text is the reason why it gave nothing."""
     try:
         car = with_load(vehicle, run)
-        return measure_signals(
-            load_signals(run.logs, vehicle=car, signal_map=signal_map, dbc=dbc), car, run, request
-        )  # fmt: skip
+        signals = load_signals(run.logs, vehicle=car, signal_map=signal_map, dbc=dbc)
+        if request.whole_only and signals.quality.truncated:
+            why = "; ".join(signals.quality.notes[:1]) or "part of it is missing"
+            return f"{run.logs[0].name} is cut ({why}). Try: copy it again"
+        return measure_signals(signals, car, run, request)
     except AqualogError as error:
         return error.line()
     except OSError as error:
