@@ -148,7 +148,7 @@ def watch(
         found = watch(
             folder, campaign, kind, by=by, limits=limits, page=page, once=once, every_s=every, say=say, progress=hear
         )
-    notes = [*found.notes, f"the page is {page}"]
+    notes = [f"the page is {page}"]
     if not once:
         return Output(found, notes, code=int(ExitCode.INTERRUPTED))
     return Output(found, notes, code=None if found.test.entries else int(ExitCode.NOTHING_USABLE))

@@ -145,6 +145,7 @@ ONE_DRIVE = (
     Case(
         "validate_text", f"validate {S}/loaded_monday.parquet {S}/loaded_friday.parquet {CAR} --no-why --method 18571"
     ),
+    Case("watch", f"watch {S} --campaign {THESIS} --once --json", keep="none/*"),
     Case("diagnose_text", f"diagnose {S}/loaded_friday.parquet {CAR} --no-bootstrap"),
     Case("diagnose_model", f"diagnose {S}/loaded_monday.parquet {CAR} --model given/model.toml --no-bootstrap --json"),
     Case("diagnose_wet", f"diagnose {S}/lane_drive.mf4 {CAR} --no-bootstrap --json"),

@@ -70,7 +70,8 @@ def _group(run: Run, like: Group) -> Group:
 def problems(watched: Watched) -> list[str]:
     """What needs somebody: damaged logs, copies, logs that no run names, a folder that is away."""
     lines = [f"the folder is away: {watched.look.away}"] if watched.look.away else []
-    lines += [f"{name}: {reason.removeprefix(f'{name}: ')}" for name, reason in watched.failed.items()]
+    # errors name the whole path; here the folder is known
+    lines += [f"{name}: {r.partition(f'{name}: ')[2] or r}" for name, r in watched.failed.items()]
     lines += [f"{name}: the same log as {other}, counts once" for name, other in watched.same.items()]
     if watched.unplanned:
         lines.append(f"in no run of the campaign: {_named(watched.unplanned)}")
