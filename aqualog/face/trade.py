@@ -107,7 +107,6 @@ def tyre_test(
     control: str = "",
     index: float = 100.0,
     limits: PathLike | None = None,
-    jobs: int | None = None,
     progress: Progress = None,
     **of_kind: Any,
 ) -> TyreTest:
@@ -130,13 +129,11 @@ def tyre_test(
         Index of the control, 1 to 1000.
     limits : str or Path, optional
         Thresholds that differ from the defaults.
-    jobs : int, optional
-        Logs at a time; default one per core.
     progress : callable, optional
         Called with each step of the work, such as `print`.
     **of_kind
         `curve`: `radius` [m], `result` (`min`, `mean`, `area`). `braking`: `v_from`, `v_to` [km/h], `coefficients`
-        (file of the wet grip index). All: `dbc`.
+        (file of the wet grip index). All: `jobs` (logs at a time; default one per core), `dbc`.
 
     Raises
     ------
@@ -154,7 +151,7 @@ def tyre_test(
     from aqualog.trade.logs import Request, measure_logs, names_of_runs
 
     hear, test_kind = listener(progress), kind_of(kind)
-    dbc = of_kind.pop("dbc", ())
+    dbc, jobs = of_kind.pop("dbc", ()), of_kind.pop("jobs", None)
     given = _given(test_kind, of_kind)
     own = inputs if isinstance(inputs, CampaignInputs) else CampaignInputs(inputs, vehicle=vehicle, map=map, dbc=dbc)
     campaign = own.configured.campaign

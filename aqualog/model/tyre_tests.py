@@ -18,8 +18,8 @@ CONTROL = "worn_summer"
 """The control tyre: driven first, last, and between the others."""
 PRESSURE = 2.3e5  # [Pa]
 STRAIGHT_DEPTH, CURVE_DEPTH, BRAKING_DEPTH = 7e-3, 6e-3, 1e-3  # [m] trade: 7; 4 to 10; about 1 mm
-START_KMH, ACCELERATION = 50.0, 1.3  # [km/h, m/s²] full throttle in third or fourth gear (K)
-DRY_S, LANE_S = 3.0, 13.0  # [s] of a straight run
+START_KMH, ACCELERATION = 40.0, 1.3  # [km/h, m/s²] full throttle in third or fourth gear (K)
+DRY_S, LANE_S = 3.0, 14.0  # [s] of a straight run
 RADIUS, TROUGH_M = 100.0, 20.0  # [m] of the circle; length of its trough (K)
 CURVE_KMH = tuple(range(60, 95, 5))
 PASSES, CONTROL_RUNS, RUNS = 3, 3, 6

@@ -40,7 +40,9 @@ class Drift(NamedTuple):
 @dataclass(frozen=True, slots=True)
 class Index:
     """Index of a set: 100 (or what the user wants) times its value over that of the control at the same place in the
-    order, with Fieller's interval. `sentence` says what that means, `control` is the control's value there.
+    order, with Fieller's interval [fieller1954].
+
+    `sentence` says what that means, `control` is the control's value there.
     """
 
     value: float = math.nan
@@ -121,7 +123,7 @@ def fieller(a: Estimate, b: Estimate, *, level: float = 0.95, dof: float | None 
     level : float
         Confidence.
     dof : float, optional
-        Degrees of freedom; else those of the sum of both variances at the ratio (Satterthwaite).
+        Degrees of freedom; else those of the sum of both variances at the ratio (Satterthwaite [satterthwaite1946]).
 
     Returns
     -------

@@ -52,7 +52,7 @@ def wet_grip_index(bfc: float, bfc_control: float, temperature: float, c: Coeffi
 
     Limits: a tyre that brakes as the control does, at t0, with a control at bfc_r0: scale / 100.
 
-    Source: the form is general knowledge (K) of UN R117; the numbers are the user's.
+    Source: the form is general knowledge (K) of UN R117 [unece_r117_2011]; the numbers are the user's.
     """
     ratio = bfc / bfc_control
     return (c.scale * ratio + c.a * (temperature - c.t0) + c.b * (bfc_control / c.bfc_r0 - 1.0)) / 100.0

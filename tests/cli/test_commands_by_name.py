@@ -30,7 +30,7 @@ def test_all_are_listed_in_their_order():
 def test_an_unknown_name_is_told_with_the_nearest():
     wrong = run("detekt")
     assert wrong.exit_code == 2
-    assert "Did you mean 'detect'?" in wrong.stderr
+    assert "Did you mean 'detect'" in wrong.stderr
 
 
 HELP_OF_ALL = """

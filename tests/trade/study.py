@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -114,9 +116,10 @@ def judged(runs: list[Made]) -> list[bool]:
 def bias(pool: list[Made]) -> str:
     kept = [m for m, ok in zip(pool, judged(pool), strict=True) if ok and not m.found.is_censored]
     away = np.array([KMH * m.found.v - m.truth for m in kept])
+    reasons = Counter(re.sub(r"[\d.]+", "#", r) for m in pool for r in m.found.reasons)
     return (
         f"bias {away.mean():+.3f} km/h, sd {away.std():.3f}, largest {np.abs(away).max():.2f}, of {away.size} valid runs "
-        f"of {len(pool)} ({100 * len(kept) / len(pool):.1f} %)"
+        f"of {len(pool)} ({100 * len(kept) / len(pool):.1f} %); {dict(reasons.most_common(5))}"
     )
 
 

@@ -38,7 +38,7 @@ _RUN = (
 )
 _LANE = interval("lane_s", "s", "begin and end of the lane; null without one", null=True)
 _INDEX = (
-    *open_ci("index", "-", "index against the control at the same place in the order; the interval is Fieller's"),
+    *open_ci("index", "-", "index against the control at the same place in the order; interval by [fieller1954]"),
     number("control_value", "", "the control's value there", null=True),
     text("verdict", "the index in words; null without one", null=True),
     several("notes", "what is to be said of the set"),

@@ -12,7 +12,7 @@ from aqualog.report.campaign.labels import group_text
 from aqualog.report.sections import Cell, Figures, Headline, Line, Lines, Para, Report, Section, Table
 from aqualog.report.trade.document import TABLES, limit_rows
 from aqualog.report.trade.figures import trade_figures
-from aqualog.report.values import KMH, counted, number, pretty_unit
+from aqualog.report.values import KMH, counted, cut, number, pretty_unit
 from aqualog.trade.braking import Stop
 from aqualog.trade.curve import CurvePass
 from aqualog.trade.curve_set import RESULTS, CurveSet
@@ -62,12 +62,13 @@ def trade_report(test: TradeTest) -> Report:
     verdicts: list[Line] = [
         (group_text(s.group), s.index.sentence) for s in test.sets if s.index is not None and s.index.sentence
     ]
+    has_sets = bool(test.valid)
     invalid = [(_name(e), "; ".join(e.reasons)) for e in test.entries if not e.valid]
-    remarks = [(group_text(s.group), note) for s in test.sets for note in _notes(s)]
+    remarks = [(group_text(s.group), note) for s in test.sets if _valid(s) for note in _notes(s)]
     sections = [
         Section("", [Headline(headline(test), [*verdicts, *test.notes])], "verdict", look="verdict open", where="page"),
         Section("", [Headline(headline(test))], where="text"),
-        Section("Sets", [_sets(test), Para(_legend(test), where="everywhere")], "sets"),
+        Section("Sets", [_sets(test), Para(_legend(test), where="everywhere")] if has_sets else [], "sets"),
         Section("Against the control", [Lines(verdicts)], where="text"),
         Section("Control tyre", [Lines(_control_lines(test))], "control"),
         Section("Remarks", [Lines([*test.notes, *remarks], most=1000)], "remarks"),
@@ -92,7 +93,8 @@ def trade_report(test: TradeTest) -> Report:
 
 
 def _name(e: Entry) -> str:
-    return e.log if e.number == 1 else f"{e.log} ({e.number})"
+    name = cut(e.log)
+    return name if e.number == 1 else f"{name} ({e.number})"
 
 
 def _valid(s: SetRow) -> int:
