@@ -1,7 +1,7 @@
 """Logs that arrive in a folder: which of them are complete, by their size and time of change.
 
-A folder of the network tells nobody of its changes, and may be away for a while. So it is looked at again and again,
-and what was seen once is not forgotten.
+A folder of the network announces no changes, and may be away for a while. So it is looked at again and again, and what
+was seen once is not forgotten.
 """
 
 from __future__ import annotations

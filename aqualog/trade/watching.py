@@ -35,7 +35,7 @@ class Arrived(NamedTuple):
 class Watched:
     """What is known by now.
 
-    `new`: the drive that this look has measured, empty where there was none; `same`: a log that is another one's copy,
+    `new`: the drive that this look has measured, else empty; `same`: a log that is another one's copy,
     by name; `failed`: why logs gave nothing; `missing`: runs of the campaign whose logs have not come or gave nothing,
     and `unplanned` logs that no run names.
     """
