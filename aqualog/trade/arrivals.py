@@ -70,7 +70,7 @@ class Arrivals:
 
 
 def _logs_in(folder: Path) -> Iterator[tuple[Path, State]]:
-    """Files that bear the suffix of a log, without hidden ones: a copy under another name is none yet."""
+    """Files that bear the suffix of a log, without hidden ones: a copy under another name does not count yet."""
     folders = [folder]
     while folders:
         with os.scandir(folders.pop()) as entries:

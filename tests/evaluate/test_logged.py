@@ -126,7 +126,11 @@ def test_another_sample_rate_on_its_own_clock(folder, tmp_path):
     at = np.arange(0.07, t[-1], 0.2)
     slow = np.interp(at, t, on.astype(float)).round()
     columns = [c for c in frame.columns if c == "t" or not c.startswith("own.")]
-    frame.select(columns).filter(pl.col("t") >= 2.0).write_parquet(tmp_path / "drive.parquet")
+    # the wheels come a second after the other signals: t = 0 is theirs
+    wheels = [
+        pl.when(pl.col("t") >= 3.0).then(pl.col(f"omega_{w}")).alias(f"omega_{w}") for w in ("fl", "fr", "rl", "rr")
+    ]
+    frame.select(columns).filter(pl.col("t") >= 2.0).with_columns(wheels).write_parquet(tmp_path / "drive.parquet")
     write_csv(tmp_path / "flags.csv", [TableColumn("t", "s", at), TableColumn("flag", "", slow)])
     source = LogSource(
         "d", (tmp_path / "drive.parquet", tmp_path / "flags.csv"), RWD, rivals=(LoggedRival("slow", "flag"),),

@@ -166,6 +166,34 @@ def test_the_same_log_twice_counts_once(track, stock):
     assert found.same == {}
 
 
+def test_a_copy_that_comes_later_does_not_take_the_row(track, stock):
+    track.put("a.parquet", stock[0])
+    track.look()
+    track.look(SETTLE_S)
+    track.put("x again.parquet", stock[0])
+    track.look()
+    lines, found = track.look(SETTLE_S)
+    assert lines == []
+    assert [e.log for e in found.test.entries] == ["a.parquet"]
+    assert found.same == {"x again.parquet": "a.parquet"}
+    assert track.measured == ["a.parquet"]
+
+
+def test_a_log_that_can_be_read_in_part_is_no_run(track, tmp_path):
+    """An MCAP that ends in the middle gives its first part; a test needs all of it."""
+    aq.convert(signals(straight(v_15=74.0)), tmp_path / "whole.mcap", FWD)
+    data = (tmp_path / "whole.mcap").read_bytes()
+    (track.logs / "a.mcap").write_bytes(data[: len(data) * 4 // 5])
+    assert aq.doctor(track.logs / "a.mcap").has_loss
+    track.look()
+    lines, found = track.look(SETTLE_S)
+    assert lines == []
+    assert "a.mcap is cut (" in found.failed["a.mcap"]
+    (track.logs / "a.mcap").write_bytes(data)
+    track.look()
+    assert "74.0 km/h, valid" in track.look(SETTLE_S)[0][0]
+
+
 def test_a_folder_that_is_away_and_comes_back(track, stock):
     track.put("a.parquet", stock[0])
     track.look()
