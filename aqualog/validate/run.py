@@ -71,7 +71,9 @@ def validate(
     found = [(w, _weight(w, p)) for p, o in off.items() for w in _stretches(p.y, traces, o)]
     notes = [f"{t.name}: {n}" for t in traces for n in t.notes]
     if len(traces) >= LEAST_DRIVES and not spread:
-        notes.append("the drives do not repeat each other: the tolerances are those of the file or built in")
+        notes.append(
+            "the drives do not repeat each other (length, speed over time): tolerances are built in or the file's"
+        )
     return Validity(
         tuple(traces), plan, within / seconds if seconds else math.nan, seconds, sum(t.duration_s for t in traces),
         judged, max(found, key=lambda x: x[1])[0] if found else None, _limits(traces, all_in, plan.agreed),

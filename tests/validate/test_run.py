@@ -131,6 +131,19 @@ def test_spread_of_repetitions():
     assert math.isnan(spread_of(elsewhere, "a_x"))
 
 
+def test_three_drives_on_other_roads_are_no_repetitions():
+    """They share cells of speed, and what differs between their roads would widen every boundary."""
+    rng = np.random.default_rng(5)
+    wander = [20.0 + np.cumsum(rng.standard_normal(500)) * 0.5 for _ in range(3)]
+    made = repeated((0.0, 0.3, 0.6), 0.0)
+    others = [replace(t, over={**t.over, "v_x": v}) for t, v in zip(made, wander, strict=True)]
+    assert math.isnan(spread_of(others, "a_x"))
+    late = [replace(t, over={**t.over, "v_x": np.roll(wander[0], 30 * i)}) for i, t in enumerate(made)]
+    assert spread_of(late, "a_x") > 0.0
+    longer = [*made[:2], replace(made[2], over={k: np.resize(x, 700) for k, x in made[2].over.items()})]
+    assert math.isnan(spread_of(longer, "a_x"))
+
+
 def test_repeated_drives_give_the_tolerance_unless_the_user_does():
     drives = [drive(seed) for seed in (1, 2, 3)]
     found = judged(*drives)
