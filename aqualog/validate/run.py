@@ -26,7 +26,7 @@ BINS = 24  # of a plot that is not over time
 LEAST_IN_BIN = 10  # blocks
 BRIDGED_S = 0.5  # [s] shorter stretches within part no stretch beyond
 MOVES = 6.0  # times eps_y from the least to the greatest value of a stretch that is rated
-LEAST_BEYOND_S = 2.0  # [s] more than the agreed share allows, before a range of speed is not valid
+LEAST_BEYOND_S = 2.0  # [s] more than the agreed share allows, before a part of the speeds is not valid
 
 
 def validate(
@@ -237,7 +237,7 @@ def _limit(condition: str, v: FloatArray, bad: BoolArray, agreed: float, step: f
     tail = np.cumsum((bad.astype(np.float64) - (1.0 - agreed))[::-1])[::-1] * step
     i = int(np.argmax(tail))
     low, high, seconds = float(v[0]), float(v[-1]), v.size * step
-    if tail[i] < LEAST_BEYOND_S:
+    if tail[i] < LEAST_BEYOND_S and 1.0 - bad.mean() >= agreed:
         return Limit(condition, math.nan, low, high, float(1.0 - bad.mean()), seconds)
     return Limit(condition, float(v[i]), low, high, float(1.0 - bad[i:].mean()), seconds)
 

@@ -87,8 +87,8 @@ def test_a_log_is_measured_when_it_has_settled_and_once(track, stock):
     assert [p.name for p in found.look.growing] == ["a.parquet"]
     lines, found = track.look(0.2)
     assert lines == [
-        "a.parquet: 74.0 km/h, valid; Alpha: valid: 1 of 1; still missing: 1 planned run and 1 valid run more, for the 3 that "
-        "are needed"
+        "a.parquet: 74.0 km/h, valid; Alpha: valid: 1 of 1; still missing: 1 planned run and 1 more valid (3 are "
+        "needed)"
     ]
     assert track.look(5.0)[0] == []
     assert track.measured == ["a.parquet"]
@@ -247,7 +247,7 @@ def test_logs_that_no_run_names_and_runs_to_come(track, stock):
     assert "74.0 km/h, valid" in lines[0]
     assert found.unplanned == ("x17.parquet",)
     assert "in no run of the campaign: x17.parquet" in problems(found)
-    assert "not driven yet: 3 planned runs" in status(found)
+    assert "still missing: 3 planned runs" in status(found)
     track.plan("a,Alpha", "b,Alpha", "x17,Beta")
     own = CampaignInputs(track.base / "campaign.toml").configured
     track.watching.reconfigured(own, track.asked()[0])

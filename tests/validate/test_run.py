@@ -84,6 +84,9 @@ def test_the_speed_of_the_limit():
     assert found.share == 0.0
     assert (found.low, found.high, found.seconds) == (0.0, 49.5, 50.0)
     assert _limit("dry", v, v == 49.0, 0.95, 0.5).is_valid  # one block is less than two seconds
+    # but a drive of which less than the agreed share is within is not called valid, however short
+    short = _limit("dry", v[:20], v[:20] >= 9.0, 0.95, 0.1)
+    assert (short.above, short.share) == (9.0, 0.0)
 
 
 def test_the_worst_is_a_stretch_not_a_spike():

@@ -59,7 +59,7 @@ def set_sentence(row: SetRow, watched: Watched) -> str:
     planned = sum(_group(r, row.group) == row.group for r in watched.missing)
     missing = [counted(planned, "planned run")] if planned else []
     if valid + planned < least:
-        missing.append(counted(int(least) - valid - planned, "valid run") + f" more, for the {least:g} that are needed")
+        missing.append(f"{int(least) - valid - planned} more valid ({least:g} are needed)")
     return "; ".join([*parts, *([f"still missing: {' and '.join(missing)}"] if missing else [])])
 
 
@@ -83,7 +83,7 @@ def status(watched: Watched) -> str:
     test = watched.test
     sets = [f"{group_text(s.group)}: {set_sentence(s, watched)}" for s in test.sets]
     growing = f"being copied: {_named([p.name for p in watched.look.growing])}" if watched.look.growing else ""
-    coming = f"not driven yet: {counted(len(watched.missing), 'planned run')}" if watched.missing else ""
+    coming = f"still missing: {counted(len(watched.missing), 'planned run')}" if watched.missing else ""
     return displayed_text(" | ".join(x for x in (*sets, coming, growing) if x) or "no run yet")
 
 
@@ -106,7 +106,7 @@ def watch_page(watched: Watched, *, title: str, clock: str, refresh_s: float) ->
         ], "verdict", look="verdict open"),
         Section("Problems", [Lines(problems(watched), most=20)], "problems-section", look="problems"),
         Section("Being copied", [Lines([str(p.name) for p in watched.look.growing], most=5)], "growing"),
-        Section("Not driven yet", [Lines(missing, most=20)], "missing"),
+        Section("Still missing of the campaign", [Lines(missing, most=20)], "missing"),
     ]  # fmt: skip
     rest = [
         replace(s, parts=[p for p in s.parts if not isinstance(p, Figures)])
