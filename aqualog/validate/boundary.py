@@ -11,10 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.core.compiled import compiled
 from aqualog.core.records import FloatArray
 
 __all__ = ["Boundary", "Tolerance", "beyond", "boundary"]
 
+_MOST_PARTS = 100  # points between two of the curve
 _FINE = 0.1  # of eps_x between two ellipses: their union then is 0.1 % of eps_y narrower than the strip
 
 
@@ -94,45 +96,49 @@ def beyond(
         where the curve has no point within eps_x.
     """
     fine_x, fine_y = _fine(x, y, tolerance)
-    out = np.full(measured_x.shape, np.nan)
     if not fine_x.size:
-        return out
+        return np.full(measured_x.shape, np.nan)
     ex, ey = tolerance.along_x(fine_x), tolerance.along_y(fine_y)
     reach = float(ex.max())
     first = np.searchsorted(fine_x, measured_x - reach, "left")
     last = np.searchsorted(fine_x, measured_x + reach, "right")
-    for i in np.flatnonzero(np.isfinite(measured_y) & (last > first)).tolist():
-        here = slice(int(first[i]), int(last[i]))
-        share = _share(measured_x[i] - fine_x[here], ex[here])
-        near = share >= 0.0
-        if not near.any():
-            continue
-        off = measured_y[i] - fine_y[here][near]
-        over = np.abs(off) - ey[here][near] * np.sqrt(share[near])
-        least = int(np.argmin(over))
-        out[i] = np.copysign(over[least], off[least]) if over[least] > 1e-12 else 0.0
+    out: FloatArray = _nearest(fine_x, fine_y, ex, ey, measured_x, measured_y, first, last)
     return out
 
 
-def _share(apart: FloatArray, ex: FloatArray) -> FloatArray:
-    """1 - (apart / eps_x)², the square of the share of eps_y that is left; without eps_x only the point itself."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = np.where(apart == 0.0, 0.0, np.abs(apart) / ex)
-    return np.asarray(1.0 - ratio * ratio)
+@compiled
+def _nearest(x, y, ex, ey, measured_x, measured_y, first, last):  # type: ignore[no-untyped-def]
+    """Of each measured point the least distance beyond any of the ellipses from `first` to before `last`, along y."""
+    out = np.full(measured_x.size, np.nan)
+    for i in range(measured_x.size):
+        if np.isnan(measured_y[i]):
+            continue
+        least, sign = np.inf, 1.0
+        for j in range(first[i], last[i]):
+            apart = abs(measured_x[i] - x[j])
+            if apart > ex[j]:
+                continue
+            ratio = apart / ex[j] if ex[j] > 0.0 else 0.0
+            off = measured_y[i] - y[j]
+            over = abs(off) - ey[j] * np.sqrt(max(1.0 - ratio * ratio, 0.0))
+            if over < least:
+                least, sign = over, 1.0 if off >= 0.0 else -1.0
+        if least < np.inf:
+            out[i] = sign * least if least > 1e-12 else 0.0
+    return out
 
 
 def _fine(x: FloatArray, y: FloatArray, tolerance: Tolerance) -> tuple[FloatArray, FloatArray]:
     """The curve with points between its own, so dense that the ellipses about them leave no gap."""
     good = np.isfinite(x) & np.isfinite(y)
     ex = tolerance.along_x(x)
-    parts_x, parts_y = [], []
-    for i in np.flatnonzero(good).tolist():
-        parts_x.append(x[i : i + 1])
-        parts_y.append(y[i : i + 1])
-        if i + 1 < x.size and good[i + 1] and x[i + 1] > x[i]:
-            step = _FINE * max(float(ex[i]), float(ex[i + 1]))
-            n = int(min(np.ceil((x[i + 1] - x[i]) / step), 100)) if step > 0.0 else 1
-            share = np.arange(1, n) / n
-            parts_x.append(x[i] + share * (x[i + 1] - x[i]))
-            parts_y.append(y[i] + share * (y[i + 1] - y[i]))
-    return np.concatenate([*parts_x, np.empty(0)]), np.concatenate([*parts_y, np.empty(0)])
+    step = _FINE * np.maximum(ex[:-1], ex[1:])
+    joined = good[:-1] & good[1:] & (np.diff(x) > 0.0) & (step > 0.0)
+    parts = np.ones(x.size, dtype=np.int64)  # points from each one on to the next
+    parts[:-1][joined] = np.clip(np.ceil(np.diff(x)[joined] / step[joined]), 1, _MOST_PARTS).astype(np.int64)
+    at = np.repeat(np.arange(x.size), np.where(good, parts, 0))
+    share = (np.arange(at.size) - np.searchsorted(at, at)) / parts[at]
+    following = np.minimum(at + 1, x.size - 1)
+    between = share > 0.0  # a value beside a gap must not enter
+    moved = [np.where(between, v[at] + share * (v[following] - v[at]), v[at]) for v in (x, y)]
+    return moved[0], moved[1]

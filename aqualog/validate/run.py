@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aqualog.core.errors import SignalError
 from aqualog.core.records import BoolArray, FloatArray, Signals
@@ -25,6 +27,7 @@ __all__ = ["trace_of", "validate"]
 BINS = 24  # of a plot that is not over time
 LEAST_IN_BIN = 10  # blocks
 BRIDGED_S = 0.5  # [s] shorter stretches within part no stretch beyond
+LONGEST_S = 60.0  # [s] of a rated stretch
 MOVES = 6.0  # times eps_y from the least to the greatest value of a stretch that is rated
 LEAST_BEYOND_S = 2.0  # [s] more than the agreed share allows, before a part of the speeds is not valid
 
@@ -253,7 +256,7 @@ def _rated(traces: Sequence[Trace], plan: Plan) -> tuple[Rated, ...]:
                 continue
             a, b = trace.measured[signal], trace.simulated[signal]
             edges = np.flatnonzero(np.diff(np.concatenate([[0], _good(trace, a, b).astype(np.int8), [0]])))
-            for i, j in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+            for i, j in _pieces(edges, round(LONGEST_S / trace.step)):
                 if j - i >= LEAST_SAMPLES and np.ptp(a[i:j]) > least.get(signal, 0.0):
                     r = rating(a[i:j], b[i:j])
                     found.append((r, (j - i) * trace.step))
@@ -269,6 +272,15 @@ def _rated(traces: Sequence[Trace], plan: Plan) -> tuple[Rated, ...]:
             ]
             out.append(Rated(signal, total, *mean))
     return tuple(out)
+
+
+def _pieces(edges: NDArray[np.int64], most: int) -> list[tuple[int, int]]:
+    """Stretches of the samples, long ones in even parts: the method is one for events of seconds."""
+    out = []
+    for i, j in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        cuts = np.linspace(i, j, max(1, -(-(j - i) // most)) + 1).round().astype(int).tolist()
+        out += list(pairwise(cuts))
+    return out
 
 
 def _good(trace: Trace, a: FloatArray, b: FloatArray) -> BoolArray:

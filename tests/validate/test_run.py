@@ -14,7 +14,7 @@ from aqualog.model.simulate import simulate
 from aqualog.model.term import Model
 from aqualog.validate.boundary import Tolerance
 from aqualog.validate.records import PLOTS, Plan, Plot, Trace
-from aqualog.validate.run import _limit, validate
+from aqualog.validate.run import _limit, _pieces, validate
 from aqualog.validate.spread import spread_of
 
 SPEED = ((0.0, 18.0), (10.0, 18.0), (25.0, 32.0), (35.0, 32.0), (50.0, 20.0), (60.0, 20.0))
@@ -161,6 +161,10 @@ def test_repeated_drives_give_the_tolerance_unless_the_user_does():
     given = judged(*drives, plan=Plan((own, *PLOTS[1:]), given=frozenset({"a_x"})))
     assert "a_x" not in given.spread
     assert given.plan.plots[0] == own
+
+
+def test_long_stretches_are_rated_in_parts():
+    assert _pieces(np.array([0, 100, 200, 1500]), 600) == [(0, 100), (200, 633), (633, 1067), (1067, 1500)]
 
 
 def test_nothing_to_compare():
