@@ -35,7 +35,7 @@ class Situation:
 
 SITUATIONS: dict[str, Situation] = {
     **{n: Situation(n, title, "aquaplaning", make) for n, (title, make) in WATER.items()},
-    **{n: Situation(n, title, "nuisance", make) for n, (title, make) in (DRY | CHASSIS | FAULTS).items()},
+    **{n: Situation(n, title, "nuisance", make) for n, (title, make) in (DRY | FAULTS | CHASSIS).items()},
 }
 
 
