@@ -53,8 +53,8 @@ def curve(
     """Curved aquaplaning: the lateral acceleration that is left in a trough of water on a circle, over the entry speed.
 
     Constant steering, several passes at each speed, 5 km/h faster each time, until the least lateral acceleration is 0.
-    Of each set: speeds of the greatest, the half and no lateral acceleration, and one number with its interval that is
-    compared with the control: mean of the least (min) or of the mean acceleration (mean), or the area under it (area).
+    Each set has the speeds of the greatest, the half and no lateral acceleration, and one number with its interval.
+    --control compares it: mean of the least acceleration (min), of the mean one (mean), or the area under it (area).
 
     \b
     Examples:

@@ -122,7 +122,7 @@ def _one(
 
 
 def _number(values: Mapping[str, float | str], key: str) -> float:
-    """Return a number of a run's row; NaN where it is none."""
+    """Return a number of a run's row; NaN where it is missing."""
     try:
         return float(values.get(key, "nan"))
     except ValueError:
