@@ -15,6 +15,7 @@ test_app = typer.Typer(
     help="Tyre tests as the trade publishes them: straight and curved aquaplaning, wet braking.", no_args_is_help=True,
     rich_markup_mode=None,
 )  # fmt: skip
+_NOUNS = {"straight": "run", "curve": "pass", "braking": "stop"}
 _OUT = "out:test page:test limits jobs dbc data force"
 
 
@@ -53,8 +54,8 @@ def curve(
     """Curved aquaplaning: the lateral acceleration that is left in a trough of water on a circle, over the entry speed.
 
     Constant steering, several passes at each speed, 5 km/h faster each time, until the least lateral acceleration is 0.
-    Of each set: speeds of the greatest, the half and no lateral acceleration, and one number with its interval that is
-    compared with the control: mean of the least (min) or of the mean acceleration (mean), or the area under it (area).
+    Each set has the speeds of the greatest, the half and no lateral acceleration, and one number with its interval.
+    --control compares it: mean of the least acceleration (min), of the mean one (mean), or the area under it (area).
 
     \b
     Examples:
@@ -107,6 +108,8 @@ def _test_of(run: Run, kind: str, targets: tuple[Path | None, Path | None], **op
         written.append(str(found.write_page(page, force=True)))
     notes = [f"written: {', '.join(written)}"] if written else []
     if not found.test.valid:
+        reasons = [r for e in found.test.entries for r in e.reasons] or list(found.test.failed.values())
+        run.console.error(f"no {_NOUNS[kind]} of a {kind} test counts ({reasons[0] if reasons else 'no log'})")
         return Output(found, notes, code=int(ExitCode.NOTHING_USABLE))
     return Output(found, notes)
 

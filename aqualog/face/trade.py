@@ -67,7 +67,10 @@ class TyreTest(Result):
         from aqualog.report.figures import side_by_side
         from aqualog.report.trade.figures import trade_figures
 
-        return side_by_side(list(trade_figures(self.test).values()))
+        sentence = {"text": self.headline(), "showarrow": False}
+        return side_by_side(
+            list(trade_figures(self.test).values()) or [{"data": [], "layout": {"annotations": [sentence]}}]
+        )
 
     def files(self) -> Writers:
         """Return the document, sets and runs as CSV, and the page, each by the name of the test."""

@@ -129,7 +129,7 @@ def measure_log(
 
 
 def _number(values: Mapping[str, float | str], key: str) -> float:
-    """Return a number of a run's row; NaN where it is none."""
+    """Return a number of a run's row; NaN where it is missing."""
     try:
         return float(values.get(key, "nan"))
     except ValueError:

@@ -19,7 +19,7 @@ SIGNS = {"minor_spin_down": "minor spin-down", "slip_slope_drop": "drop of the s
 
 
 class Onset(NamedTuple):
-    """Speed at the first event of each detector of `SIGNS` on the lane [m/s]; NaN where there was none. `missing`: what
+    """Speed at the first event of each detector of `SIGNS` on the lane [m/s]; NaN without one. `missing`: what
     a detector lacked, by its name.
     """
 

@@ -19,7 +19,7 @@ _MEAN_S = 0.1  # [s]
 
 class Looked(NamedTuple):
     """What is looked at: the lane, slip (n,) [-] and speed (n,) [m/s], the place of the crossing in samples (or of the
-    highest speed, if there is none), and the driven wheels' torque (n,) [N·m].
+    highest speed without one), and the driven wheels' torque (n,) [N·m].
     """
 
     span: Span

@@ -19,7 +19,7 @@ APART = 1.0 / 3.6  # [m/s] references that differ by more are remarked
 
 class Speeds(NamedTuple):
     """Speed by the reference and by the other one (n,) [m/s], NaN where unknown; their names, the first empty where
-    there is no speed. `notes`: what is to be said of them, or why there is none.
+    there is no speed. `notes`: what is to be said of them, or why a speed is missing.
     """
 
     own: FloatArray
@@ -63,7 +63,7 @@ def references(
 def _free(
     signals: Signals, vehicle: Vehicle, axle: str, dry: str, v_x: FloatArray, before: BoolArray
 ) -> tuple[str, float, str]:
-    """Return the free wheel on the dry side (empty: there is none), its radius [m], and a note on that."""
+    """Return the free wheel on the dry side (empty: all are driven), its radius [m], and a note on that."""
     if vehicle.drivetrain == "awd":
         return "", math.nan, "all wheels are driven: no free wheel checks v_x"
     other = "r" if axle == "f" else "f"

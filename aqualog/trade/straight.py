@@ -54,7 +54,7 @@ class StraightRun:
     ratio : float
         q, the dry second's ratio of the dry wheel's speed to the wet one's. [-]
     t_15 : float
-        Time of the crossing from the log's first sample. [s] NaN if there is none.
+        Time of the crossing from the log's first sample. [s] NaN without one.
     wet_side, axle
         Side in water; driven axle that is compared, `f` or `r`.
     lane : (float, float), optional
@@ -86,7 +86,7 @@ class StraightRun:
 
     @property
     def v(self) -> float:
-        """Speed of 15 % slip; of a censored run the speed that it is above. [m/s] NaN where there is none."""
+        """Speed of 15 % slip; of a censored run the speed that it is above. [m/s] NaN without either."""
         return self.v_bound if self.is_censored else self.speeds.get("v_15", math.nan)
 
     @property

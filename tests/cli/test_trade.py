@@ -145,7 +145,7 @@ def test_measured_drives_hold_no_such_run(car, test, real_logs, tmp_path):
     why = {
         "straight": "no watered lane in the log",
         "curve": "no watered lane in the log",
-        "braking": "km/h in the log",
+        "braking": "v_x is not in the log",
     }
     assert why[test] in done.stdout
 

@@ -15,6 +15,7 @@ from aqualog.detect.registry import RIVALS, all_of
 from aqualog.detect.slip_slope.tuning import MEANINGS as TUNING_MEANINGS
 from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.model.tyre import TYRE_KEYS, TYRES
+from aqualog.trade.limits import described
 from aqualog.validate.records import PLOTS
 
 __all__ = [
@@ -254,12 +255,19 @@ k is 1/C, beta the slope ratio of the axles, delta the slip offset.
 """
 
 
+_TESTS = (
+    "`aqualog test` has a file of its own, which names only what differs: `[straight]`, below it `yaw_rate = 0.08`. "
+    "K: general knowledge."
+)
+
+
 def thresholds_page() -> str:
     """The page."""
     own = [(code(d.name), d.unit, f"{d.threshold:g}", d.meaning) for d in all_of("effect", "joint")]
     rivals = [(code(r.name), r.unit, f"{r.threshold:g}", f"{r.title} {r.reference}") for r in RIVALS.values()]
     joint = [(code(k.name), k.kind, str(k.default), k.meaning) for k in JOINT_KEYS]
     tuning = [(code(n), unit, _shown(getattr(TUNING, n)), meaning) for n, (unit, meaning) in TUNING_MEANINGS.items()]
+    tests = [(code(d.path), d.unit, f"{d.value:g}", d.meaning, d.source) for d in described()]
     return page(
         "Thresholds file",
         _THRESHOLDS,
@@ -277,6 +285,9 @@ def thresholds_page() -> str:
         "## Tuning of the slip-slope filter",
         _TUNING,
         table(("name", "unit", "value", "meaning"), tuning),
+        "## Tyre tests: `--limits`",
+        _TESTS,
+        table(("key", "unit", "default", "meaning", "source"), tests),
     )
 
 
