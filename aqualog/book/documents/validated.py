@@ -87,7 +87,7 @@ VALIDATE = Document(
         obj("diagnosis", "the verdict of `aqualog diagnose` on the same drives; null with --no-why", (
             text("verdict", "as there"),
             text("sentence", "as there"),
-            text("caution", "as there; empty without one"),
+            text("caution", "as there; null without one", null=True),
             rows("causes", "as there", (
                 text("effect", "name of the effect"),
                 text("where", "its place; null for the whole car", null=True),
