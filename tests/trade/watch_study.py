@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from threading import Thread
 
 import aqualog as aq
 from aqualog.core.vehicle import vehicle_toml
@@ -89,19 +90,28 @@ def main() -> int:
         (folder / "logs").mkdir()
         command = [sys.executable, "-m", "aqualog", "watch", str(folder / "logs"), "--campaign", str(campaign)]
         watch = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        lines: list[tuple[float, str]] = []
+        reader = Thread(target=lambda: lines.extend((time.monotonic(), x) for x in watch.stdout), daemon=True)
+        reader.start()
         seen: list[dict[int, int]] = []
+        whole: dict[str, float] = {}
         for i, log in enumerate(logs):
             data = log.read_bytes()
             if i in range(10, 10 + asked.damaged):  # the first cut, the next not a log at all
                 data = data[: len(data) // 2] if i == 10 else b"MDF     4.10" + bytes(5000)
             copy_in_pieces(data, folder / "logs" / log.name, asked.every)
+            whole[log.name] = time.monotonic()
             seen.append(memory_of(watch.pid))
         shutil.copy(logs[0], folder / "logs" / "again.mf4")
         time.sleep(12.0)
         seen.append(memory_of(watch.pid))
         page = (folder / "campaign.watch.html").read_text(encoding="utf-8")
         watch.send_signal(signal.SIGINT)
-        out, err = watch.communicate(timeout=60)
+        err = watch.stderr.read()
+        watch.wait(60)
+        reader.join()
+        out = "".join(x for _, x in lines)
+        late = sorted(t - whole[x.split(":")[0]] for t, x in lines if x.split(":")[0] in whole and "valid; " in x)
         renews = 'http-equiv="refresh"' in page
         sys.stdout.write(f"{out}\n--- stderr\n{err}\n")
         rows = [
@@ -112,6 +122,7 @@ def main() -> int:
         sys.stdout.write(
             f"exit {watch.returncode}; rows {len(rows)}; logs in them {len({r.split(':')[0] for r in rows})}; "
             f"page {len(page) / 1e3:.0f} kB, refresh {renews}\n"
+            f"from the last piece to the line: median {late[len(late) // 2]:.1f} s, most {late[-1]:.1f} s\n"
             f"memory of all its processes: {early:.0f} MB after 15 logs, {total[-1]:.0f} MB at the end, "
             f"most {max(total):.0f} MB; by process at the end {[round(x / 1e3) for x in seen[-1].values()]}, "
             f"after 15 {[round(x / 1e3) for x in seen[min(15, len(seen) - 1)].values()]}\n"
