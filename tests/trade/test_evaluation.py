@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from aqualog.book.topics import DOCS
 from aqualog.campaign.definition import Campaign, Run
 from aqualog.core.errors import ConfigError
 from aqualog.report.page import report_page
@@ -194,6 +195,24 @@ def test_curve_document_and_index():
     assert set(d["sets"][1]) >= {"value", "ci95", "index", "index_ci95", "v_half_kmh", "v_zero_kmh", "v_greatest_kmh"}
     assert "4.00" in report_text(trade_report(test))
     json.dumps(d, allow_nan=False)
+
+
+@pytest.mark.parametrize("kind", ["straight", "curve", "braking"])
+def test_documents_are_as_their_schemas_say(kind):
+    jsonschema = pytest.importorskip("jsonschema")
+    stop = Stop(22.2, 5.6, 33.0, 0.7, math.nan, math.nan, 1e-3, math.nan, 3.0, 5.4)
+    record = {"straight": run(80.0), "curve": CurvePass(20.0, 4.0, 2.0, 3.0, 100.0), "braking": stop}[kind]
+    bad = {
+        "straight": StraightRun(reasons=("no",)),
+        "curve": CurvePass(reasons=("no",)),
+        "braking": Stop(reasons=("no",)),
+    }
+    found = entries(("C", [record, record]), ("A", [record, bad[kind]]), ("B", [bad[kind]]), ("C", [record]))
+    test = evaluated(found, Options(kind, defaults(), ("tyre",), "C"), {"gone.mf4": "no such file"})
+    stored = json.loads((DOCS / "schemas" / f"test_{kind}.schema.json").read_text(encoding="utf-8"))
+    document = json.loads(json.dumps(trade_document(test, "made"), allow_nan=False))
+    assert [e.message for e in jsonschema.Draft202012Validator(stored).iter_errors(document)] == []
+    assert "<html" in report_page(trade_report(test), title="made", plotly="none")
 
 
 def campaign(*tyres):

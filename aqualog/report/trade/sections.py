@@ -72,7 +72,7 @@ def trade_report(test: TradeTest) -> Report:
         Section("Against the control", [Lines(verdicts)], where="text"),
         Section("Control tyre", [Lines(_control_lines(test))], "control"),
         Section("Remarks", [Lines([*test.notes, *remarks], most=1000)], "remarks"),
-        Section("In the order of the runs", [Figures([n for n in figures if n != "slip"])], "plot-section"),
+        Section("Over speed and order" if kind == "curve" else "In the order of the runs", [Figures([n for n in figures if n != "slip"])], "plot-section"),
         Section("Slip over speed", [Figures(["slip"])] if "slip" in figures else [], "slip-section"),
         Section(f"Not valid: {len(invalid)} of {len(test.entries)}", [Lines(invalid, most=20, most_text=20)], "invalid",
                 look="problems"),
