@@ -13,6 +13,7 @@ from aqualog.core.errors import ConfigError
 from aqualog.report.page import report_page
 from aqualog.report.text import report_text
 from aqualog.report.trade.document import trade_document
+from aqualog.report.trade.figures import trade_figures
 from aqualog.report.trade.sections import headline, trade_report
 from aqualog.trade.braking import Stop
 from aqualog.trade.curve import CurvePass
@@ -213,6 +214,15 @@ def test_documents_are_as_their_schemas_say(kind):
     document = json.loads(json.dumps(trade_document(test, "made"), allow_nan=False))
     assert [e.message for e in jsonschema.Draft202012Validator(stored).iter_errors(document)] == []
     assert "<html" in report_page(trade_report(test), title="made", plotly="none")
+
+
+def test_names_that_a_page_could_run_are_text():
+    name = "<b>A</b>&%{x}"
+    test = straight(("C", [run(80.0), run(80.4)]), (name, [run(80.0), run(81.0)]), ("C", [run(80.1)]), control="C")
+    figures = json.dumps(trade_figures(test), ensure_ascii=False)
+    assert "<b>" not in figures
+    assert "‹b›A" in figures
+    assert "<b>A" not in report_page(trade_report(test), title="made", plotly="none")
 
 
 def campaign(*tyres):

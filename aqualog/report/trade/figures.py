@@ -10,7 +10,7 @@ import numpy as np
 from aqualog.report.campaign.labels import group_text
 from aqualog.report.figures import PALETTE, axis, dots, error_bars, figure, line
 from aqualog.report.theme import INK, MUTED
-from aqualog.report.values import KMH
+from aqualog.report.values import KMH, plot_text
 from aqualog.trade.curve import CurvePass
 from aqualog.trade.curve_set import RESULTS
 from aqualog.trade.evaluation import SetRow, TradeTest
@@ -101,7 +101,7 @@ def _index(test: TradeTest) -> dict[str, Any] | None:
     rows = [s for s in test.sets if s.index is not None and np.isfinite(s.index.value)]
     if not rows:
         return None
-    names = [group_text(s.group) for s in rows]
+    names = [plot_text(group_text(s.group)) for s in rows]
     value, low, high = (
         np.array(x, dtype=np.float64)
         for x in zip(*((s.index.value, *s.index.ci) for s in rows if s.index is not None), strict=True)
@@ -117,7 +117,7 @@ def _index(test: TradeTest) -> dict[str, Any] | None:
         "line": {"color": MUTED, "width": 1.5, "dash": "dash"},
     }  # fmt: skip
     return figure(
-        [found], f"index against {test.options.control} ({of:g}), 95 %", axis("index"),
+        [found], f"index against {plot_text(test.options.control, 40)} ({of:g}), 95 %", axis("index"),
         axis(type="category", automargin=True, autorange="reversed"), height=130 + 30 * len(rows), shapes=[shape],
     )  # fmt: skip
 
