@@ -237,6 +237,12 @@ def test_order_of_the_runs():
     assert [e.log for e in entries_of(c, names, dict(enumerate(at)), ("tyre",))] == ["1", "2", "0"]
     same = [m._replace(start_ns=5) for m in at]  # a clock that is not set: as in the campaign
     assert [e.log for e in entries_of(c, names, dict(enumerate(same)), ("tyre",))] == ["0", "1", "2"]
+    two = [m._replace(start_ns=t) for m, t in zip(at, (300, 5, 5), strict=True)]
+    assert [e.log for e in entries_of(c, names, dict(enumerate(two)), ("tyre",))] == ["0", "1", "2"]
+    late = replace(run(80.0), lane=(40.0, 50.0))  # a log of a whole session: its runs follow each other
+    session = [m._replace(start_ns=7_000_000_000, found=(f,)) for m, f in
+               zip(at, (late, run(80.0), replace(late, lane=(20.0, 30.0))), strict=True)]  # fmt: skip
+    assert [e.log for e in entries_of(c, names, dict(enumerate(session)), ("tyre",))] == ["1", "2", "0"]
     broken = {0: at[0], 1: "cannot be read", 2: at[2]}
     assert [e.log for e in entries_of(c, names, broken, ("tyre",))] == ["2", "0"]
 
