@@ -127,8 +127,8 @@ def entries_of(
     entries = []
     for order, (i, number, record, m) in enumerate(found):
         run, onset = campaign.runs[i], m.onset[number - 1] if m.onset else None
-        tyre, values = str(run.values.get("tyre", "")), tuple(sorted(run.groups.items()))
-        entries.append(Entry(names[i], number, float(order), _group(run, keys), tyre, record, onset, values=values))
+        tyre = str(run.values.get("tyre", ""))
+        entries.append(Entry(names[i], number, float(order), _group(run, keys), tyre, record, onset))
     return tuple(entries)
 
 
