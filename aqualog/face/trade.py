@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 __all__ = ["TyreTest", "kind_of", "tyre_test"]
 
 _KINDS = ("straight", "curve", "braking")
-_INSIDE = ("onset_missing", "curve", "configuration")  # parts of a row that are no cells of a table
+_INSIDE = ("onset_missing", "curve")  # parts of a row that are no cells of a table
 
 
 @dataclass(frozen=True, eq=False, repr=False)

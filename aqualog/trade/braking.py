@@ -124,8 +124,6 @@ def stop_between(v: FloatArray, v_from: float, v_to: float) -> list[tuple[float,
     for k in range(1, x.size):
         if x[k - 1] > v_from >= x[k]:
             begin = _place(good, x, k, v_from)
-        if x[k] > v_from:
-            begin = math.nan
         if x[k - 1] > v_to >= x[k] and math.isfinite(begin):
             found.append((begin, _place(good, x, k, v_to)))
             begin = math.nan

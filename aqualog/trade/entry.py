@@ -24,8 +24,7 @@ class Entry:
     """One run, pass or stop.
 
     `number` counts those of a log from 1 on. `order` is its place among all of the test, in the order in which they
-    were driven. `of_set` are reasons that come from comparing it with its set. `values` are what the campaign says of
-    it, as text.
+    were driven. `of_set` are reasons that come from comparing it with its set.
     """
 
     log: str
@@ -36,7 +35,6 @@ class Entry:
     found: Record
     onset: Onset | None = None
     of_set: tuple[str, ...] = ()
-    values: tuple[tuple[str, str], ...] = ()
 
     @property
     def reasons(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from aqualog.trade.braking import Stop
 from aqualog.trade.control import Block, Control, Drift, Estimate, Index, blocks_of, index_of
 from aqualog.trade.curve import CurvePass
 from aqualog.trade.curve_set import CurveResult, CurveSet, common_speeds, curve_set
-from aqualog.trade.entry import Entry, Kind
+from aqualog.trade.entry import Entry, Kind, Record
 from aqualog.trade.grip import Coefficients, wet_grip_index
 from aqualog.trade.limits import Limits
 from aqualog.trade.logs import Measured
@@ -114,29 +114,28 @@ def entries_of(
 ) -> tuple[Entry, ...]:
     """Return all runs, passes or stops in the order in which they were driven.
 
-    That is by the logs' absolute times where all logs have different ones, else by the campaign's order.
+    That is by their absolute times where all have different ones, else by the campaign's order.
     """
-    known = {i: m for i, m in measured.items() if isinstance(m, Measured)}
-    starts = [m.start_ns for m in known.values()]
-    has_times = all(s is not None for s in starts) and len(set(starts)) == len(starts)
-    order = sorted(known, key=lambda i: (known[i].start_ns if has_times else 0, i))
-    entries: list[Entry] = []
-    for i in order:
-        run, found = campaign.runs[i], known[i]
-        for number, record in enumerate(found.found, 1):
-            entries.append(
-                Entry(
-                    names[i],
-                    number,
-                    float(len(entries)),
-                    _group(run, keys),
-                    str(run.values.get("tyre", "")),
-                    record,
-                    found.onset[number - 1] if found.onset else None,
-                    values=tuple(sorted(run.groups.items())),
-                )
-            )
+    found = [
+        (i, number, record, m)
+        for i, m in sorted(measured.items()) if isinstance(m, Measured)
+        for number, record in enumerate(m.found, 1)
+    ]  # fmt: skip
+    times = [m.start_ns * 1e-9 + _begin(record) for _, _, record, m in found if m.start_ns is not None]
+    if len(times) == len(set(times)) == len(found):
+        found = [found[k] for k in sorted(range(len(found)), key=lambda k: times[k])]
+    entries = []
+    for order, (i, number, record, m) in enumerate(found):
+        run, onset = campaign.runs[i], m.onset[number - 1] if m.onset else None
+        tyre = str(run.values.get("tyre", ""))
+        entries.append(Entry(names[i], number, float(order), _group(run, keys), tyre, record, onset))
     return tuple(entries)
+
+
+def _begin(record: Record) -> float:
+    """Return when a record begins, from its log's first sample [s]; 0 where it has no place."""
+    begin = record.start_s if isinstance(record, Stop) else record.lane[0] if record.lane else 0.0
+    return begin if math.isfinite(begin) else 0.0
 
 
 def evaluated(entries: Sequence[Entry], options: Options, failed: Mapping[str, str] | None = None) -> TradeTest:

@@ -51,8 +51,9 @@ def references(
         apart = float(np.nanmedian(np.abs(v_x - by_wheel)[on_lane]))
         more = (f"v_x and {free} differ by {3.6 * apart:.1f} km/h on the lane",) if apart > APART else ()
         return Speeds(v_x, by_wheel, ("v_x", free), (*((note,) if note else ()), *more))
-    if has_free and not note:
-        return Speeds(by_wheel, none, (free, ""), (f"no v_x: the speed is that of the free wheel {free}",))
+    if has_free:
+        own = f"no v_x on the lane: the speed is that of the free wheel {free}"
+        return Speeds(by_wheel, none, (free, ""), (own, *((note,) if note else ())))
     what = "there is no speed on the lane: no v_x, and "
     if not free:
         return Speeds(none, none, ("", ""), (f"{what}all wheels are driven",))

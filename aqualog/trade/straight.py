@@ -24,6 +24,7 @@ __all__ = ["LEVELS", "StraightRun", "crossing", "slip_of", "straight_run", "stra
 LEVELS = {"v_05": 0.05, "v_10": 0.10, "v_15": 0.15, "v_50": 0.50}
 """Slips at which speeds are read. [-] That of `v_15` is the limit in use."""
 _V_LEAST = 3.0  # [m/s] below, a yaw rate says nothing about the wheels' speeds
+_SIDE_S = 0.1  # [s] of the mean that shows the wet side
 _SLIP_LEAST = 0.03  # [-] a wheel that turns faster by less does not show the wet side
 _RATE_LEAST = 10.0  # [Hz] slower, a slip that lasts 0.1 s falls between two samples
 _SHOWN_HZ = 50.0  # of the curve that is kept
@@ -269,6 +270,7 @@ def _side(
     left, right = (signals.array(f"omega_{w}") for w in AXLES[axle])
     with np.errstate(divide="ignore", invalid="ignore"):
         quotient = np.where((left > 1.0) & (right > 1.0), left / right, np.nan)
+    quotient = mean_over(quotient, _SIDE_S, signals.dt)
     dry, wet = quotient[before & np.isfinite(quotient)], quotient[on_lane & np.isfinite(quotient)]
     unknown = ("the wet side is not known: no depth of the left and right track, and both wheels turn alike",)
     if dry.size < 2 or wet.size < 2:

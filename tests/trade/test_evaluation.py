@@ -7,11 +7,13 @@ from pathlib import Path
 
 import pytest
 
+from aqualog.book.topics import DOCS
 from aqualog.campaign.definition import Campaign, Run
 from aqualog.core.errors import ConfigError
 from aqualog.report.page import report_page
 from aqualog.report.text import report_text
 from aqualog.report.trade.document import trade_document
+from aqualog.report.trade.figures import trade_figures
 from aqualog.report.trade.sections import headline, trade_report
 from aqualog.trade.braking import Stop
 from aqualog.trade.curve import CurvePass
@@ -196,6 +198,33 @@ def test_curve_document_and_index():
     json.dumps(d, allow_nan=False)
 
 
+@pytest.mark.parametrize("kind", ["straight", "curve", "braking"])
+def test_documents_are_as_their_schemas_say(kind):
+    jsonschema = pytest.importorskip("jsonschema")
+    stop = Stop(22.2, 5.6, 33.0, 0.7, math.nan, math.nan, 1e-3, math.nan, 3.0, 5.4)
+    record = {"straight": run(80.0), "curve": CurvePass(20.0, 4.0, 2.0, 3.0, 100.0), "braking": stop}[kind]
+    bad = {
+        "straight": StraightRun(reasons=("no",)),
+        "curve": CurvePass(reasons=("no",)),
+        "braking": Stop(reasons=("no",)),
+    }
+    found = entries(("C", [record, record]), ("A", [record, bad[kind]]), ("B", [bad[kind]]), ("C", [record]))
+    test = evaluated(found, Options(kind, defaults(), ("tyre",), "C"), {"gone.mf4": "no such file"})
+    stored = json.loads((DOCS / "schemas" / f"test_{kind}.schema.json").read_text(encoding="utf-8"))
+    document = json.loads(json.dumps(trade_document(test, "made"), allow_nan=False))
+    assert [e.message for e in jsonschema.Draft202012Validator(stored).iter_errors(document)] == []
+    assert "<html" in report_page(trade_report(test), title="made", plotly="none")
+
+
+def test_names_that_a_page_could_run_are_text():
+    name = "<b>A</b>&%{x}"
+    test = straight(("C", [run(80.0), run(80.4)]), (name, [run(80.0), run(81.0)]), ("C", [run(80.1)]), control="C")
+    figures = json.dumps(trade_figures(test), ensure_ascii=False)
+    assert "<b>" not in figures
+    assert "‹b›A" in figures
+    assert "<b>A" not in report_page(trade_report(test), title="made", plotly="none")
+
+
 def campaign(*tyres):
     runs = tuple(Run((Path(f"{i}.mf4"),), Path("car.toml"), None, None, {"tyre": t}) for i, t in enumerate(tyres))
     return Campaign("made", Path("campaign.toml"), None, runs)
@@ -208,6 +237,12 @@ def test_order_of_the_runs():
     assert [e.log for e in entries_of(c, names, dict(enumerate(at)), ("tyre",))] == ["1", "2", "0"]
     same = [m._replace(start_ns=5) for m in at]  # a clock that is not set: as in the campaign
     assert [e.log for e in entries_of(c, names, dict(enumerate(same)), ("tyre",))] == ["0", "1", "2"]
+    two = [m._replace(start_ns=t) for m, t in zip(at, (300, 5, 5), strict=True)]
+    assert [e.log for e in entries_of(c, names, dict(enumerate(two)), ("tyre",))] == ["0", "1", "2"]
+    late = replace(run(80.0), lane=(40.0, 50.0))  # a log of a whole session: its runs follow each other
+    session = [m._replace(start_ns=7_000_000_000, found=(f,)) for m, f in
+               zip(at, (late, run(80.0), replace(late, lane=(20.0, 30.0))), strict=True)]  # fmt: skip
+    assert [e.log for e in entries_of(c, names, dict(enumerate(session)), ("tyre",))] == ["1", "2", "0"]
     broken = {0: at[0], 1: "cannot be read", 2: at[2]}
     assert [e.log for e in entries_of(c, names, broken, ("tyre",))] == ["2", "0"]
 

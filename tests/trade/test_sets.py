@@ -113,6 +113,7 @@ def test_summary_of_one_run_and_of_none():
     assert summarised([], [], 4, LIMITS).valid == 0
     assert "give no mean" in " ".join(summarised([78.0], [80.0, 81.0], 3, LIMITS).notes)
     assert "no width" in " ".join(summarised([78.0, 78.0, 78.0], [], 3, LIMITS).notes)
+    assert summarised([0.7] * 6, [], 6, LIMITS).sd == 0.0  # a mean of equal floats is another float
 
 
 def test_away_from_the_median():

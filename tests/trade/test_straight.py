@@ -1,6 +1,7 @@
 """The straight test of one run, by hand-made wheel speeds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -132,6 +133,22 @@ def test_the_wet_side_is_found_by_the_wheels_where_no_depth_is_known():
     run = one({k: x for k, x in straight(side="right").items() if not k.startswith("water")})
     assert run.wet_side == "right"
     assert "turns faster" in run.notes[0]
+
+
+def test_radius_of_the_free_wheel_that_the_vehicle_file_does_not_have():
+    car = replace(FWD, given=frozenset({"drivetrain"}), r_e_r=0.4)
+    columns = straight()
+    run = one(columns, car)
+    assert run.speeds_other["v_15"] / KMH == pytest.approx(78.0, abs=0.01)  # learnt: 0.317 m
+    assert "is learnt from v_x before the lane" in " ".join(run.notes)
+    columns["v_x"] = np.where(np.arange(1500) < 300, columns["v_x"], np.nan)  # lost on the lane
+    run = one(columns, car)
+    assert run.reference == "omega_rr"
+    assert run.v / KMH == pytest.approx(78.0, abs=0.01)
+    del columns["v_x"]
+    run = one(columns, car)
+    assert not run.valid
+    assert "the vehicle file has no wheels.r_e_r" in run.reasons[0]
 
 
 def test_no_drivetrain():

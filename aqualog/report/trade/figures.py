@@ -10,8 +10,9 @@ import numpy as np
 from aqualog.report.campaign.labels import group_text
 from aqualog.report.figures import PALETTE, axis, dots, error_bars, figure, line
 from aqualog.report.theme import INK, MUTED
-from aqualog.report.values import KMH
+from aqualog.report.values import KMH, plot_text
 from aqualog.trade.curve import CurvePass
+from aqualog.trade.curve_set import RESULTS
 from aqualog.trade.evaluation import SetRow, TradeTest
 from aqualog.trade.straight import StraightRun
 
@@ -24,10 +25,10 @@ _UNIT = {"straight": "speed of 15 % slip [km/h]", "braking": "braking force coef
 def trade_figures(test: TradeTest) -> dict[str, Any]:
     """Return the figures by name: `data` and `layout` of plotly; those without data are left out."""
     found = {
-        "order": _order(test) if test.options.kind != "curve" else None,
-        "index": _index(test),
         "mean": _curves(test, "mean") if test.options.kind == "curve" else None,
         "least": _curves(test, "least") if test.options.kind == "curve" else None,
+        "order": _order_of_sets(test) if test.options.kind == "curve" else _order(test),
+        "index": _index(test),
         "slip": _slip(test) if test.options.kind == "straight" else None,
     }
     return {n: f for n, f in found.items() if f is not None}
@@ -57,21 +58,50 @@ def _order(test: TradeTest) -> dict[str, Any] | None:
                     [e.value for e in own], colour, size=8, style={"symbol": symbol, "line": {"width": 2}},
                     hovertemplate="%{x}: %{y:.4g}<extra>%{fullData.name}</extra>",
                 ))  # fmt: skip
-    for c in test.controls:
-        blocks = c.control.blocks
-        data.append(line(
-            f"{c.control.name} between its sets", [b.order + 1.0 for b in blocks], [b.estimate.value for b in blocks],
-            MUTED, width=1.5, style={"dash": "dash"},
-        ))  # fmt: skip
+    data += _control_lines(test)
     title = "in the order of the runs, and the drift of the control" if test.controls else "in the order of the runs"
     return figure(data, title, axis("run"), axis(_UNIT[test.options.kind])) if data else None
+
+
+def _control_lines(test: TradeTest) -> list[dict[str, Any]]:
+    """The control between its sets, one line for each configuration."""
+    return [
+        line(
+            f"{c.control.name} between its sets" + (f", {group_text(c.rest)}" if c.rest else ""),
+            [b.order + 1.0 for b in c.control.blocks], [b.estimate.value for b in c.control.blocks], MUTED, width=1.5,
+            style={"dash": "dash"}, mode="lines+markers",
+        )
+        for c in test.controls
+    ]  # fmt: skip
+
+
+def _order_of_sets(test: TradeTest) -> dict[str, Any] | None:
+    """The number that is compared, set by set in the order of the passes, with the control's line."""
+    data = []
+    for s in (s for s in test.sets if s.curve is not None and np.isfinite(s.curve.result) and not s.is_control):
+        order = [test.entries[i].order + 1.0 for i in s.members if test.entries[i].valid]
+        assert s.curve is not None
+        value, (low, high) = np.array([s.curve.result]), s.curve.ci
+        colour = _colour(test, s)
+        data.append(dots(
+            group_text(s.group), [float(np.mean(order))], value, colour, size=9,
+            error_y=error_bars(value, np.array([low]), np.array([high]), colour),
+            hovertemplate="%{y:.4g}<extra>%{fullData.name}</extra>",
+        ))  # fmt: skip
+    data += _control_lines(test)
+    unit = RESULTS[test.options.result][0]
+    return (
+        figure(data, "sets in the order of the passes", axis("pass"), axis(f"{test.options.result} [{unit}]"))
+        if data
+        else None
+    )
 
 
 def _index(test: TradeTest) -> dict[str, Any] | None:
     rows = [s for s in test.sets if s.index is not None and np.isfinite(s.index.value)]
     if not rows:
         return None
-    names = [group_text(s.group) for s in rows]
+    names = [plot_text(group_text(s.group)) for s in rows]
     value, low, high = (
         np.array(x, dtype=np.float64)
         for x in zip(*((s.index.value, *s.index.ci) for s in rows if s.index is not None), strict=True)
@@ -87,7 +117,7 @@ def _index(test: TradeTest) -> dict[str, Any] | None:
         "line": {"color": MUTED, "width": 1.5, "dash": "dash"},
     }  # fmt: skip
     return figure(
-        [found], f"index against {test.options.control} ({of:g}), 95 %", axis("index"),
+        [found], f"index against {plot_text(test.options.control, 40)} ({of:g}), 95 %", axis("index"),
         axis(type="category", automargin=True, autorange="reversed"), height=130 + 30 * len(rows), shapes=[shape],
     )  # fmt: skip
 

@@ -28,6 +28,9 @@ _TITLES = {
     "curve": ("curved aquaplaning", "lateral acceleration in a trough on a circle"),
     "braking": ("wet braking", "braking force coefficient (v1² - v2²) / (2 d g)"),
 }
+_DRAWN = {
+    "straight": "In the order of the runs", "curve": "Over speed and order", "braking": "In the order of the stops",
+}  # fmt: skip
 _NOUNS = {"straight": "run", "curve": "pass", "braking": "stop"}
 _MOST_RUNS = 30  # in a terminal; all of them are in page, CSV and JSON
 _WIDTH = 110  # characters of a line of thresholds
@@ -72,7 +75,7 @@ def trade_report(test: TradeTest) -> Report:
         Section("Against the control", [Lines(verdicts)], where="text"),
         Section("Control tyre", [Lines(_control_lines(test))], "control"),
         Section("Remarks", [Lines([*test.notes, *remarks], most=1000)], "remarks"),
-        Section("In the order of the runs", [Figures([n for n in figures if n != "slip"])], "plot-section"),
+        Section(_DRAWN[kind], [Figures([n for n in figures if n != "slip"])], "plot-section"),
         Section("Slip over speed", [Figures(["slip"])] if "slip" in figures else [], "slip-section"),
         Section(f"Not valid: {len(invalid)} of {len(test.entries)}", [Lines(invalid, most=20, most_text=20)], "invalid",
                 look="problems"),
