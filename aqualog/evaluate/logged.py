@@ -44,6 +44,11 @@ class LoggedRival:
     sign: str = ">"
     level: float | None = None
 
+    @property
+    def text(self) -> str:
+        """`DAI.Level>=2`."""
+        return self.channel if self.level is None else f"{self.channel}{self.sign}{self.level:g}"
+
 
 @dataclass(frozen=True, slots=True)
 class Heard:

@@ -55,7 +55,8 @@ class Comparison(Result):
     def document(self) -> dict[str, Any]:
         from aqualog.report.evaluation import evaluation_document
 
-        return evaluation_document(self.evaluation, by=self.keys, gates=self.gates)
+        logged = {r.name: r.text for r in self.logged}
+        return {**evaluation_document(self.evaluation, by=self.keys, gates=self.gates), "logged": logged}
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:

@@ -73,6 +73,8 @@ def validate(
     within = sum(float(w[t.judged].sum()) * t.step for t, w in zip(traces, all_in, strict=True))
     found = [(w, _weight(w, p)) for p, o in off.items() for w in _stretches(p.y, traces, o)]
     notes = [f"{t.name}: {n}" for t in traces for n in t.notes]
+    if len(traces) < LEAST_DRIVES:
+        notes.append(f"{len(traces)} of the {LEAST_DRIVES} drives that the method asks for at the least")
     if len(traces) >= LEAST_DRIVES and not spread:
         notes.append(
             "the drives do not repeat each other (length, speed over time): tolerances are built in or the file's"

@@ -64,6 +64,7 @@ def test_an_exact_and_a_late_rival(folder):
     # of full aquaplaning, which must be found within 0.5 s, the late one is on only where partial came long before
     assert d["detectors"]["exact"]["full"]["recall"] == 1.0
     assert d["detectors"]["exact"]["drives"] == 3
+    assert d["logged"] == {"exact": "own.exact", "late": "own.late", "level": "own.level>=0.3"}
 
 
 def test_the_same_rules_as_for_aqualog(folder):

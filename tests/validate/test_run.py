@@ -38,6 +38,7 @@ def sound():
 def test_a_car_that_is_that_of_the_file_is_valid(sound):
     assert sound.share > 0.99
     assert [x.is_valid for x in sound.limits] == [True]
+    assert sound.notes[-1] == "1 of the 3 drives that the method asks for at the least"
     assert {j.plot.y for j in sound.judged} > {"a_x", "slip_fl", "slip_rr"}
     assert all(j.share == 1.0 for j in sound.judged if j.plot.x != "t")
     (a_x,) = (r for r in sound.rated if r.signal == "a_x")
