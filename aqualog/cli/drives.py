@@ -175,7 +175,7 @@ def _written(result: Diagnosis, model: Path | None, page: Path | None) -> tuple[
 
 
 @command(
-    "logs:validated vehicle:believed model:known signals dbc method:validity boundaries why out:page rate "
+    "logs:validated vehicle:needed model:known signals dbc method:validity boundaries why out:page rate "
     "correct_offsets cache data force"
 )
 def validate(run: Run, method: str, boundaries: Path | None, why: bool, out: Path | None) -> Output:

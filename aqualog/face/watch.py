@@ -191,14 +191,18 @@ class _Session:
             self.tell_once(f"the campaign has changed and is not right, the one before goes on: {error.line()}")
 
     def _report(self, before: Watched | None, now: Watched) -> None:
-        from aqualog.report.trade.watching import problems, run_lines, status
+        from aqualog.report.trade.watching import damaged, problems, remarks, run_lines, status
 
         for line in run_lines(now):
             self.say(line)
         if before is not None and before.look.away and not now.look.away:
             self.hear.note("the folder is back")
             self._said -= {x for x in self._said if x.startswith("the folder is away")}
-        for line in problems(now):
+        for name, reason in damaged(now).items():
+            if (told := f"{name}: {reason}") not in self._said:
+                self._said.add(told)
+                self.hear.failed(name, reason)
+        for line in remarks(now):
             self.tell_once(line)
         self.is_changed |= before is None or status(before) != status(now) or problems(before) != problems(now)
 

@@ -17,7 +17,7 @@ from aqualog.trade.entry import Entry
 from aqualog.trade.evaluation import SetRow, TradeTest
 from aqualog.trade.watching import Watched
 
-__all__ = ["MARK", "problems", "run_lines", "set_sentence", "status", "watch_page"]
+__all__ = ["MARK", "damaged", "problems", "remarks", "run_lines", "set_sentence", "status", "watch_page"]
 
 MARK = "a test while it is driven"
 """Stands in every page of a watch, so that a later one may take its place."""
@@ -69,9 +69,17 @@ def _group(run: Run, like: Group) -> Group:
 
 def problems(watched: Watched) -> list[str]:
     """What needs somebody: damaged logs, copies, logs that no run names, a folder that is away."""
+    return [*remarks(watched), *(f"{name}: {reason}" for name, reason in damaged(watched).items())]
+
+
+def damaged(watched: Watched) -> dict[str, str]:
+    """Why logs gave nothing, by name. Errors name the whole path; here the folder is known."""
+    return {name: displayed_text(r.partition(f"{name}: ")[2] or r) for name, r in watched.failed.items()}
+
+
+def remarks(watched: Watched) -> list[str]:
+    """The other problems."""
     lines = [f"the folder is away: {watched.look.away}"] if watched.look.away else []
-    # errors name the whole path; here the folder is known
-    lines += [f"{name}: {r.partition(f'{name}: ')[2] or r}" for name, r in watched.failed.items()]
     lines += [f"{name}: the same log as {other}, counts once" for name, other in watched.same.items()]
     if watched.unplanned:
         lines.append(f"in no run of the campaign: {_named(watched.unplanned)}")
