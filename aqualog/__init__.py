@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from aqualog.face.inspect import doctor, inspect
     from aqualog.face.simulate import simulate
     from aqualog.face.slip_slope import slip_slope
+    from aqualog.face.trade import tyre_test
+    from aqualog.face.validate import validate
+    from aqualog.face.watch import watch
     from aqualog.model.term import Model
 
 __version__ = "0.14.0"
@@ -53,6 +56,9 @@ _FACE = {
     "inspect": "aqualog.face.inspect",
     "diagnose": "aqualog.face.diagnose",
     "simulate": "aqualog.face.simulate",
+    "validate": "aqualog.face.validate",
+    "watch": "aqualog.face.watch",
+    "tyre_test": "aqualog.face.trade",
     "Drive": "aqualog.face.drive",
     "Signals": "aqualog.core.records",
     "Vehicle": "aqualog.core.vehicle",
@@ -88,6 +94,9 @@ __all__ = [
     "simulate",
     "slip_slope",
     "thesis",
+    "tyre_test",
+    "validate",
+    "watch",
 ]
 
 

@@ -14,7 +14,7 @@ import aqualog
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
     "core", "physics", "guard", "io", "align", "features", "checks", "calibrate",
-    "detect", "model", "evaluate", "campaign", "diagnose", "doctor", "report", "thesis", "config", "face", "book", "cli",
+    "detect", "model", "evaluate", "campaign", "trade", "diagnose", "validate", "doctor", "report", "thesis", "config", "face", "book", "cli",
 )  # fmt: skip
 # align/propose and align/load read a map, which is a record of align; config turns TOML into these records
 HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")
@@ -117,6 +117,7 @@ def test_detectors_read_no_truth_and_no_labels():
                 "campaign",
                 "diagnose",
                 "cache",
+                "test",
                 "plan",
                 "doctor",
                 "help",

@@ -71,8 +71,21 @@ COMMANDS = {
         "drives",
         "Find what the simulation gets wrong on measured drives: the cause, its size and interval, and the gain.",
     ),
+    "validate": Command(
+        "drives",
+        "Judge whether the simulation of a car is valid on measured drives: in one sentence, and why not.",
+    ),
     "evaluate": Command(
         "drives", "Compare what the detectors find with what was there: recall, latency, false alarms, confusion."
+    ),
+    "test": Command(
+        "trade",
+        "Tyre tests as the trade publishes them: straight and curved aquaplaning, wet braking.",
+        function="test_app",
+    ),
+    "watch": Command(
+        "trade",
+        "Measure the runs of a tyre test as their logs arrive in a folder: a line and a page that renews itself.",
     ),
     "simulate": Command("thesis", "Simulate one drive of a scenario file, or the drives of a measuring campaign."),
     "figures": Command("thesis", "Make figures of the thesis again, from runs, with what they say about its claims."),

@@ -10,7 +10,7 @@ from aqualog.cli.frame import Output, Run, command
 if TYPE_CHECKING:
     from aqualog.face.diagnose import Diagnosis
 
-__all__ = ["calibrate", "diagnose", "evaluate"]
+__all__ = ["calibrate", "diagnose", "evaluate", "validate"]
 
 
 @command(
@@ -175,7 +175,45 @@ def _written(result: Diagnosis, model: Path | None, page: Path | None) -> tuple[
 
 
 @command(
-    "logs:campaign vehicle:of_logs signals dbc labels by:tables rivals roc thresholds tune gate junit out:page "
+    "logs:validated vehicle:needed model:known signals dbc method:validity boundaries why out:page rate "
+    "correct_offsets cache data force"
+)
+def validate(run: Run, method: str, boundaries: Path | None, why: bool, out: Path | None) -> Output:
+    """Judge whether the simulation of a car is valid on measured drives: in one sentence, and why not.
+
+    By the methods of ISO 19364 [iso19364_2016] (boundaries in cross plots) and ISO/TS 18571 [iso18571_2024] (a rating),
+    on another test than theirs.
+    The simulation follows the measured torque and steering. Three drives or more that repeat each other give the
+    tolerances. Then the verdict of `aqualog diagnose` follows, which takes about a minute; --no-why leaves it out.
+
+    \b
+    Examples:
+      aqualog validate drive.mf4 --vehicle car.toml --no-why
+      aqualog validate run1.mf4 run2.mf4 run3.mf4 --vehicle car.toml -o validity.html
+      aqualog validate drive.mf4 --vehicle car.toml --method 18571 --boundaries own.toml --json
+    """
+    from aqualog.core.errors import ExitCode
+    from aqualog.face.drives import NothingUsableError, grouped
+    from aqualog.face.validate import validate
+
+    run.need_vehicle("it is what the simulation believes")
+    others = [p for p in (run.model, boundaries) if p is not None]
+    drive = run.drive([out] if out is not None else [], others=others)
+    try:
+        with run.hearing("nothing was written") as hear:
+            result = validate(
+                grouped(run.logs, drive), drive.vehicle, method=method, boundaries=boundaries, model=run.model,
+                why=why, progress=hear,
+            )  # fmt: skip
+    except NothingUsableError:  # each reason was reported
+        return Output(code=int(ExitCode.NOTHING_USABLE))
+    if out is not None:
+        result.write_page(out, force=True)
+    return Output(result, [*result.notes, *([f"the page is {out}"] if out is not None else [])])
+
+
+@command(
+    "logs:campaign vehicle:of_logs signals dbc labels by:tables rivals rival roc thresholds tune gate junit out:page "
     "data force"
 )
 def evaluate(
@@ -183,6 +221,7 @@ def evaluate(
     labels: Path | None,
     by: str,
     rivals: bool,
+    rival: list[str] | None,
     roc: bool,
     tune: Path | None,
     gate: list[str] | None,
@@ -201,15 +240,18 @@ def evaluate(
       aqualog evaluate campaign.toml --tune thresholds.toml
       aqualog evaluate drive.mf4 --vehicle car.toml --labels labels.csv --json
       aqualog evaluate dry/*.mf4 --vehicle car.toml --labels dry.csv
+      aqualog evaluate campaign.toml --rival own=ESP.AquaWarn --rival 'easyrain=DAI.Level>=2'
       aqualog evaluate campaign.toml --gate 'joint_cusum.recall>=0.9' --junit g.xml
     """
     from aqualog.core.errors import ConfigError, ExitCode
     from aqualog.evaluate.gates import parse_gates
     from aqualog.evaluate.judge import ODD_LABELS
+    from aqualog.evaluate.logged import parse_rivals
     from aqualog.face.arguments import refuse_existing
     from aqualog.face.evaluate import evaluate, inputs_of
 
-    parse_gates(gate or (), with_rivals=rivals)
+    logged = [r.name for r in parse_rivals(rival or ())]
+    parse_gates(gate or (), with_rivals=rivals, logged=logged)
     if junit is not None and not gate:
         raise ConfigError("--junit without --gate", expected="--gate 'joint_cusum.recall>=0.9'")
     given = inputs_of(run.logs, run.vehicle, map=run.signals, dbc=run.dbc, labels=labels)
@@ -217,8 +259,8 @@ def evaluate(
     refuse_existing([p for p in (tune, out, junit) if p], force=run.force, sources=own)
     with run.hearing("nothing was written") as hear:
         found = evaluate(
-            run.logs, run.vehicle, labels=labels, map=run.signals, dbc=run.dbc, by=by, rivals=rivals, roc=roc,
-            thresholds=run.thresholds, tune=tune is not None, progress=hear,
+            run.logs, run.vehicle, labels=labels, map=run.signals, dbc=run.dbc, by=by, rivals=rivals,
+            rival=rival or (), roc=roc, thresholds=run.thresholds, tune=tune is not None, progress=hear,
         )  # fmt: skip
     found = found.gated(gate or ())
     has_records = bool(found.evaluation.records)

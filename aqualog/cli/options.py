@@ -189,6 +189,20 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "bootstrap": _option(
         bool, True, "--bootstrap/--no-bootstrap", help="Without: quicker, the test by its formula alone."
     ),
+    "logs:validated": _argument(
+        list[str], "Logs, each argument a drive of its own; a folder is one drive of several files.", "LOG..."
+    ),
+    "method:validity": _option(
+        str, "boundary", "--method", metavar="NAME",
+        help="Which the sentence goes by: boundary (ISO 19364) or 18571 (ISO/TS 18571). The page has both.",
+    ),
+    "boundaries": _file(
+        "Tolerances of the cross plots (TOML); default: those of three repeated drives, else aqualog's own.",
+        "--boundaries",
+    ),
+    "why": _option(
+        bool, True, "--why/--no-why", help="Diagnose the drives too; without it the answer takes seconds."
+    ),
     "labels": _file(
         "Labels (CSV start_s,end_s,effect,wheel), or a folder with NAME.csv for each log NAME; without lines: no "
         "water.", "--labels",
@@ -196,7 +210,39 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "by:tables": _option(
         str, "", "--by", help="Tables by configuration: tyre,depth,pressure,manoeuvre,... of the campaign."
     ),
+    "by:sets": _option(
+        str, "", "--by", metavar="KEYS",
+        help="Keys of a set: tyre,pressure,depth,load,... of the campaign. Default: those in which the runs differ.",
+    ),
+    "control": _option(
+        str, "", "--control", metavar="TYRE", help="Tyre of the control sets, with which the others are compared."
+    ),
+    "index": _option(float, 100.0, "--index", help="Index of the control.", min=1.0, max=1000.0),
+    "radius": _option(
+        float | None, None, "--radius", help="Radius of the circle in m: passes on another one do not count.", min=5.0,
+        max=2000.0,
+    ),
+    "result": _option(str, "mean", "--result", help="min, mean or area: what is compared.", metavar="NAME"),
+    "v_from": _option(float, 80.0, "--from", help="Speed at which a stop begins, km/h.", min=1.0, max=300.0),
+    "v_to": _option(float, 20.0, "--to", help="Speed at which it ends, km/h.", min=1.0, max=300.0),
+    "coefficients": _file("Coefficients of the wet grip index (TOML), from your copy.", "--coefficients"),
+    "limits": _file("Thresholds of the tests that differ from the defaults (TOML).", "--limits"),
+    "out:test": _file("Folder for the document, sets and runs as CSV, and the page.", metavar="DIR"),
+    "page:test": _file("Page (HTML).", "--page"),
+    "folder:watched": _argument(
+        Path, "Folder in which logs arrive, also of the network, with the folders below it.", "FOLDER"
+    ),
+    "campaign:watched": _file("Campaign file; its runs name the logs to come.", "--campaign", metavar="CAMPAIGN.toml"),
+    "kind": _option(str, "straight", "--test", help="straight, curve or braking.", metavar="NAME"),
+    "out:watch": _file("Page that renews itself (HTML); default beside the campaign file: NAME.watch.html."),
+    "once": _flag("Measure what is there, and end.", "--once"),
+    "every": _option(float, 1.0, "--every", help="Seconds between two looks.", min=0.1, max=3600.0, metavar="S"),
     "rivals": _flag("Also the methods of the prior art.", "--rivals"),
+    "rival": _option(
+        list[str] | None, None, "--rival", metavar="NAME=CHANNEL",
+        help="A detector that is in the log: true or false, or a number with a level, NAME=CHANNEL>=LEVEL; may be "
+        "repeated.",
+    ),
     "roc": _flag("Also at thresholds from a quarter to four times.", "--roc"),
     "tune": _file(
         "Propose thresholds on some drives, report them on the others, and write them here.", "--tune"

@@ -30,6 +30,7 @@ def simulate(run: Run, what: list[str], out: Path, seed: int | None) -> Output:
       aqualog simulate scenario.toml --seed 7 -o drive.csv --json
       aqualog simulate scenario.toml --model model.toml -o drive.mcap
       aqualog simulate campaign thesis -o thesis --jobs 2
+      aqualog simulate campaign straight-test -o straight
     """
     if what[0] == "campaign":
         strange = {"--model": run.model is not None, "--seed": seed is not None, "--json": run.json}

@@ -59,6 +59,8 @@ _ALL = [
     _number("", "grade_profile", "m, %", None, -40.0, 40.0, "slope over the way, [[s, percent], ...]"),
     _number("", "brake_profile", "s, N*m", None, 0.0, 50000.0, "brake torque of all wheels, [[t, M], ...]"),
     _number("", "torque_profile", "s, N*m", None, -20000.0, 20000.0, "drive torque on top of the driver's"),
+    _number("", "vectoring_profile", "s, N*m", None, -5000.0, 5000.0, "torque from the left to the right wheel of the "
+        "driven axle, of awd the rear one, [[t, M], ...]"),
     _number("", "split_profile", "s, -", None, 0.0, 1.0, "rear share of the drive torque (awd), [[t, share], ...]"),
     _number("", "wind_profile", "s, km/h", None, -150.0, 150.0, "head wind over time, on top of `head_wind_kmh`"),
     _number("", "drive_share_profile", "s, -", None, 0.0, 2.0, "share of the driver's torque that arrives"),
@@ -84,7 +86,8 @@ _ALL = [
     _number("fault", "start_s", "s", None, 0.0, _DAY, "begin; must be given"),
     _number("fault", "end_s", "s", None, 0.0, _DAY, "end; must be given"),
     _text("fault", "kind", "missing", ", ".join(FAULT_KINDS)),
-    _text("steering", "kind", "sine", "sine"),
+    _text("steering", "kind", "sine", "sine; hold: the angle rises within half a period and stays; "
+          "lane_change: a period to one side, one straight ahead, one back"),
     _number("steering", "amplitude_deg", "deg", None, -45.0, 45.0, "mean road-wheel angle; first half a lobe to the "
             "left"),
     _number("steering", "steering_wheel_amplitude_deg", "deg", None, -720.0, 720.0, "over the `steering_ratio`"),
@@ -143,6 +146,7 @@ def load_scenario(path: Path) -> Scenario:
         excitation=_excitation(file.table("excitation"), vehicle),
         brake_torque=_profile(file, "brake_profile"),
         extra_torque=_profile(file, "torque_profile"),
+        vectoring=_profile(file, "vectoring_profile"),
         split_rear=_profile(file, "split_profile"),
         grade=_grade(file),
         head_wind=_value(file, "head_wind_kmh") / 3.6,
@@ -390,7 +394,7 @@ def _steering(table: Table, vehicle: Vehicle | None, speed: Profile, duration: f
     if not table.values:
         return None
     _check_names(table, "steering")
-    _choice(table, "kind", ("sine",))
+    kind: Any = _choice(table, "kind", ("sine", "hold", "lane_change"))
     period = _required(table, "period_s")
     start = _value(table, "start_s")
     name = _one_of(table, ("amplitude_deg", "steering_wheel_amplitude_deg"))
@@ -411,7 +415,7 @@ def _steering(table: Table, vehicle: Vehicle | None, speed: Profile, duration: f
             f"{name} = {degrees:g} asks for {lateral:.3g} m/s² to the side at {v * 3.6:.3g} km/h, more than "
             f"{LATERAL_LIMIT:g}{hint}",
         )
-    return Steering(angle, period, start)
+    return Steering(angle, period, start, kind)
 
 
 def _excitation(table: Table, vehicle: Vehicle | None) -> Excitation | None:

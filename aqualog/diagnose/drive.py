@@ -75,7 +75,7 @@ class Drive:
         return float(self.mask.sum()) * block_step(self.dt)
 
 
-def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
+def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: bool = False) -> Drive:
     """Signals of one drive as input and measurement.
 
     Raises
@@ -84,7 +84,8 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
         If the log has neither velocity nor four wheel speeds, or nothing to compare.
 
     Left out, with a second on either side: standstill and creeping, gaps, strong cornering, braking where the brakes'
-    torque is not in the log, a frozen accelerometer; with 0.1 s: jumps of the torque.
+    torque is not in the log, a frozen accelerometer; with 0.1 s: jumps of the torque. And where a wheel may float,
+    unless it is judged there, too (`judges_afloat`).
     """
     present = frozenset(s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height)
     if signals.frame.height * signals.dt < LEAST_S:
@@ -131,7 +132,9 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     )
     course = _without_lag(vehicle, measured, Model())
     floats = floating(filled, v, vehicle, course)
-    bad = gaps | floats | (v < V_MIN)
+    bad = gaps | (v < V_MIN)
+    if not judges_afloat:
+        bad |= floats
     if "a_x" in filled:
         bad |= _frozen(filled["a_x"], dt)
     bad |= np.abs(np.gradient(speed, dt)) > A_X_MAX

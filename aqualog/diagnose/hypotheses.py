@@ -19,7 +19,7 @@ from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
 from aqualog.model.term import Effect, Model, Need, Parameter, Term
 
-__all__ = ["THREADS", "Hypothesis", "hypotheses", "residual", "signatures", "value_in", "with_values"]
+__all__ = ["THREADS", "Hypothesis", "hypotheses", "residual", "signatures", "simulated", "value_in", "with_values"]
 
 THREADS = 2
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
@@ -177,13 +177,18 @@ def residual(drive: Drive, model: Model) -> FloatArray:
 
     A model that changes the velocity's sensor changes the target speed, which is computed again.
     """
+    shown = simulated(drive, model)
+    measured = channel_values(drive.columns, drive.channels, drive.vehicle, dt=drive.dt)
+    return measured - channel_values(shown, drive.channels, drive.vehicle, dt=drive.dt)
+
+
+def simulated(drive: Drive, model: Model) -> dict[str, FloatArray]:
+    """Signals of the drive as the simulation has them under a model, those that the log has alone. Each (n,)"""
     if any(t.place == "v_x" for t in model.terms):
         drive = led_by(drive, model)
     shown = follow(drive.vehicle, drive.course, model)
     # of the same signals: both sides must use the same speed, either the reference or the wheels
-    shown = {n: x for n, x in shown.items() if n in drive.present or n == "nudge_seen"}
-    measured = channel_values(drive.columns, drive.channels, drive.vehicle, dt=drive.dt)
-    return measured - channel_values(shown, drive.channels, drive.vehicle, dt=drive.dt)
+    return {n: x for n, x in shown.items() if n in drive.present or n == "nudge_seen"}
 
 
 def signatures(

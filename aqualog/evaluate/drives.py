@@ -17,6 +17,7 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.detector import JointCusumParams
 from aqualog.evaluate.labels import TRUTH_STEMS, Label, Labels, Span, after, spans_of, truth_labels, until
+from aqualog.evaluate.logged import Heard, LoggedRival, heard_in
 from aqualog.io.open_log import DriveLog
 from aqualog.io.reader import ReadOptions
 
@@ -29,7 +30,8 @@ _TRUTH = (*(f"{stem}_{w}" for stem in TRUTH_STEMS for w in WHEELS), "true_v_x")
 class Drive:
     """A drive with its labels.
 
-    `groups` is its configuration: key -> value as text; `joint` the settings of joint detector 2.
+    `groups` is its configuration: key -> value as text; `joint` the settings of joint detector 2. `heard`: what rivals
+    in the log say, by name.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Drive:
     labels: Labels
     groups: Mapping[str, str] = field(default_factory=dict)
     joint: JointCusumParams = field(default_factory=JointCusumParams)
+    heard: Mapping[str, Heard] = field(default_factory=dict)
 
     def load(self) -> Drive:
         """Return itself: a drive in memory is a source of drives too."""
@@ -72,6 +75,7 @@ class LogSource:
     lanes: tuple[Span, ...] = ()
     groups: Mapping[str, str] = field(default_factory=dict)
     joint: JointCusumParams = field(default_factory=JointCusumParams)
+    rivals: tuple[LoggedRival, ...] = ()
 
     def load(self) -> Drive:
         """Read the drive.
@@ -83,7 +87,9 @@ class LogSource:
         """
         signals = load_signals(self.paths, vehicle=self.vehicle, signal_map=self.signal_map, dbc=self.dbc)
         signals = _told(signals, self.labels or ())
-        return Drive(self.name, signals, self.vehicle, self._labels(signals), self.groups, self.joint)
+        options = read_options(self.signal_map, self.dbc)
+        heard = heard_in(self.paths, options, self.signal_map, signals, self.rivals)
+        return Drive(self.name, signals, self.vehicle, self._labels(signals), self.groups, self.joint, heard)
 
     def _labels(self, signals: Signals) -> Labels:
         if self.labels is not None:

@@ -65,18 +65,18 @@ class GateResult:
     found: str
 
 
-def parse_gates(texts: Sequence[str], *, with_rivals: bool = False) -> tuple[Gate, ...]:
-    """Read gates; a rival can be named `with_rivals` only.
+def parse_gates(texts: Sequence[str], *, with_rivals: bool = False, logged: Sequence[str] = ()) -> tuple[Gate, ...]:
+    """Read gates; a rival can be named `with_rivals` only, or as one of those that are `logged`.
 
     Raises
     ------
     ConfigError
         With the nearest known name where one is wrong.
     """
-    return tuple(_parsed(text, with_rivals=with_rivals) for text in texts)
+    return tuple(_parsed(text, logged, with_rivals=with_rivals) for text in texts)
 
 
-def _parsed(text: str, *, with_rivals: bool) -> Gate:
+def _parsed(text: str, logged: Sequence[str], *, with_rivals: bool) -> Gate:
     where, example = f"--gate {text[:80]}", "such as joint_cusum.recall>=0.9"
     match = _GATE.fullmatch(text)
     if match is None:
@@ -84,7 +84,7 @@ def _parsed(text: str, *, with_rivals: bool) -> Gate:
     detector, measure = match["detector"], match["measure"]
     if detector in RIVALS and not with_rivals:
         raise ConfigError(f'"{detector}" is a rival', where=where, expected="--rivals beside it")
-    _check_name("detector", detector, (*DETECTORS, *RIVALS), where)
+    _check_name("detector", detector, (*DETECTORS, *RIVALS, *logged), where)
     _check_name("measure", measure, MEASURES, where)
     try:
         limit = float(match["limit"])

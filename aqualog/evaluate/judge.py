@@ -54,7 +54,7 @@ def judge(drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str
 def run_detectors(
     drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None, own: bool = True
 ) -> Found:
-    """Return events of the thesis' detectors (`own`) and of the rivals; arguments as `judge`."""
+    """Return events of the thesis' detectors and of rivals in the log (both: `own`), and of `rivals`; see `judge`."""
     v_x = drive.signals.array("v_x")
     results: list[DriveResult | RivalResult] = []
     ran: list[str] = []
@@ -68,12 +68,20 @@ def run_detectors(
         of_rivals = run_rivals(drive.signals, drive.vehicle, thresholds=rivals)
         results.append(of_rivals)
         ran += dict.fromkeys(t.detector for t in of_rivals.tracks)
+    heard = drive.heard if own else {}
+    ran += [name for name, h in heard.items() if not h.missing]
     tracks = [t for r in results for t in r.tracks]
     missing = [u for r in results for u in r.unavailable]
     wheels = {d: tuple(dict.fromkeys(t.wheel for t in tracks if t.detector == d and t.wheel)) for d in ran}
+    logged = [Event(n, None, None, a, b, "partial", h.high, 0.0, {}) for n, h in heard.items() for a, b in h.spans]
+    absent = {n: h.missing for n, h in heard.items() if h.missing}
     return Found(
-        tuple(e for r in results for e in r.events), wheels, tuple(u.detector for u in missing), v_x,
-        tuple(f"{u.detector} lacks {', '.join(u.missing)}" for u in missing),
+        (*(e for r in results for e in r.events), *logged), wheels, (*(u.detector for u in missing), *absent), v_x,
+        (
+            *(f"{u.detector} lacks {', '.join(u.missing)}" for u in missing),
+            *(f"rival {n}: {why}" for n, why in absent.items()),
+            *(h.note for h in heard.values() if h.note),
+        ),
     )  # fmt: skip
 
 
@@ -101,6 +109,7 @@ def record_of(drive: Drive, found: Found, only: Collection[str] | None = None) -
         unavailable=tuple(d for d in found.unavailable if only is None or d in only),
         notes=(*found.notes, *(odd if unknown else ())),
         is_lossy=quality.truncated or quality.lost_in_files > 0,
+        heard={n: (h.low, h.high) for n, h in drive.heard.items() if not h.missing},
     )
 
 

@@ -63,7 +63,7 @@ class RunRecord:
 
     `dry_s` [s] and `dry_m` [m] are time and way outside water (and the second after it); `wet_s` is the time on water
     without aquaplaning. `detectors` holds those that could run, `unavailable` the others; `is_lossy` if the
-    log was cut or damaged.
+    log was cut or damaged. `heard`: least and greatest value of the channel of each rival in the log.
     """
 
     name: str
@@ -76,3 +76,4 @@ class RunRecord:
     unavailable: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     is_lossy: bool = False
+    heard: Mapping[str, tuple[float, float]] = field(default_factory=dict)

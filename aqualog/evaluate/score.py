@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.core.intervals import poisson, wilson
-from aqualog.detect.registry import RIVALS, all_of
+from aqualog.detect.registry import BY_NAME, RIVALS, all_of
 from aqualog.evaluate.records import Cell, Hit, RunRecord
 
 __all__ = [
     "JOINT", "TARGETS", "Better", "Coverage", "Rate", "Recall", "Score", "better_rivals", "confusion", "coverage",
-    "detector_names", "grouped", "recall_of", "score", "score_all", "situation_scores",
+    "detector_names", "grouped", "is_rival", "recall_of", "score", "score_all", "situation_scores",
 ]  # fmt: skip
 
 JOINT = tuple(d.name for d in all_of("joint"))
@@ -98,6 +98,11 @@ class Score:
     own: Recall
     false_alarms: Rate
     on_water: Rate
+
+
+def is_rival(name: str) -> bool:
+    """Whether it is a method of the prior art, or a detector that is in the log."""
+    return name in RIVALS or name not in BY_NAME
 
 
 def detector_names(records: Iterable[RunRecord]) -> list[str]:
@@ -234,9 +239,9 @@ def coverage(table: Mapping[str, Mapping[str, Score]]) -> dict[str, Coverage]:
 def better_rivals(records: Sequence[RunRecord]) -> list[Better]:
     """Return where rivals beat their counterpart or a joint detector: over all drives, and in single situations."""
     found: list[Better] = []
-    rivals = [n for n in detector_names(records) if n in RIVALS]
+    rivals = [n for n in detector_names(records) if is_rival(n)]
     for rival in rivals:
-        counterpart = RIVALS[rival].counterpart
+        counterpart = RIVALS[rival].counterpart if rival in RIVALS else None
         for own in (*((counterpart.name,) if counterpart else ()), *JOINT):
             both = [r for r in records if rival in r.detectors and own in r.detectors]
             if not both:

@@ -102,7 +102,8 @@ class Campaign(CampaignInputs):
         Parameters
         ----------
         programme : str
-            `thesis` (the measuring campaign of the thesis) or `situations` (38 situations, most without water).
+            `thesis` (the measuring campaign of the thesis), `situations` (46 situations, most without water), or a tyre
+            test: `straight-test`, `curve-test`, `braking-test`.
         folder : str or Path
             It is made if it does not exist.
         jobs : int, optional

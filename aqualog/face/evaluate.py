@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from aqualog.evaluate.drives import LogSource
     from aqualog.evaluate.gates import GateResult
     from aqualog.evaluate.labels import Label
+    from aqualog.evaluate.logged import LoggedRival
     from aqualog.evaluate.run import Evaluation
     from aqualog.report.sections import Report
 
@@ -37,7 +38,8 @@ class Comparison(Result):
     """Detections held against what was there.
 
     `evaluation` holds the records; `keys` are those of the configuration by which tables are repeated; `late` names
-    drives whose labels begin after the log has ended, with what is left out of them. `gates` are those of `gated`.
+    drives whose labels begin after the log has ended, with what is left out of them. It also names rivals in the log
+    that are never on. `gates` are those of `gated`, `logged` the rivals in the log.
     """
 
     evaluation: Evaluation
@@ -47,12 +49,14 @@ class Comparison(Result):
     late: Mapping[str, str]
     cut: tuple[str, ...] = ()
     gates: tuple[GateResult, ...] = ()
+    logged: tuple[LoggedRival, ...] = ()
 
     @cached_property
     def document(self) -> dict[str, Any]:
         from aqualog.report.evaluation import evaluation_document
 
-        return evaluation_document(self.evaluation, by=self.keys, gates=self.gates)
+        logged = {r.name: r.text for r in self.logged}
+        return {**evaluation_document(self.evaluation, by=self.keys, gates=self.gates), "logged": logged}
 
     @property
     def tables(self) -> Mapping[str, pl.DataFrame]:
@@ -86,7 +90,8 @@ class Comparison(Result):
         from aqualog.evaluate.gates import judge_gates, parse_gates
         from aqualog.evaluate.score import score_all
 
-        given = parse_gates([text_of(g, "gates") for g in gates], with_rivals=self.evaluation.rivals is not None)
+        texts, logged = [text_of(g, "gates") for g in gates], [r.name for r in self.logged]
+        given = parse_gates(texts, with_rivals=self.evaluation.rivals is not None, logged=logged)
         return replace(self, gates=judge_gates(given, score_all(self.evaluation.records)))
 
     def _report(self) -> Report:
@@ -171,6 +176,7 @@ def evaluate(
     dbc: PathLike | Sequence[PathLike] = (),
     by: str | Sequence[str] = (),
     rivals: bool = False,
+    rival: str | Sequence[str] = (),
     roc: bool = False,
     thresholds: PathLike | None = None,
     tune: bool = False,
@@ -195,6 +201,8 @@ def evaluate(
         Keys of the configuration by which the tables are repeated.
     rivals : bool
         Evaluate the methods of the prior art, too.
+    rival : str or several
+        Detectors that are in the log, `NAME=CHANNEL`, or `NAME=CHANNEL>=LEVEL` for a number.
     roc : bool
         Evaluate at thresholds from a quarter to four times, too.
     thresholds : str or Path, optional
@@ -213,8 +221,10 @@ def evaluate(
     >>> aq.evaluate("drive.mf4", "car.toml", labels="labels.csv").tables
     """
     from aqualog.campaign.definition import group_keys
+    from aqualog.evaluate.logged import parse_rivals
 
     hear = listener(progress)
+    logged = parse_rivals([rival] if isinstance(rival, str) else [text_of(r, "rival") for r in rival])
     given = inputs_of(inputs, vehicle, map=map, dbc=dbc, labels=labels)
     keys = group_keys(split(by), given.keys)
     hear.detail(f"{len(given.sources)} drives of {given.name}")
@@ -225,17 +235,18 @@ def evaluate(
     from aqualog.report.evaluation_words import notes_of
 
     start, of_rivals = load_thresholds(file_of(thresholds, "thresholds")) if thresholds is not None else (DEFAULT, {})
-    sources = given.sources
+    sources = tuple(replace(s, rivals=logged) for s in given.sources)
     if thresholds is not None:
         joint = load_settings(Path(thresholds)).joint_cusum
         sources = tuple(replace(s, joint=joint) for s in sources)
     work = tune_drives if tune else evaluate_drives
     found = work(sources, thresholds=start, rivals=of_rivals if rivals else None, with_roc=roc, report=hear)
     late, cut = _labels_beyond(found, sources)
+    late |= _silent(found, logged)
     has_loss = bool(found.failed or late or any(r.is_lossy for r in found.records))
     return Comparison(
-        found, given.name, keys, sources[0].joint, late, cut, notes=tuple(notes_of(found.records)), has_loss=has_loss,
-        sources=sources_of(given.files, thresholds),
+        found, given.name, keys, sources[0].joint, late, cut, logged=logged,
+        notes=tuple(notes_of(found.records)), has_loss=has_loss, sources=sources_of(given.files, thresholds),
     )  # fmt: skip
 
 
@@ -368,3 +379,39 @@ def _labels_beyond(found: Evaluation, sources: Sequence[LogSource]) -> tuple[dic
         if s.name in ends and any(x.start_s < ends[s.name] < x.end_s for x in s.labels or ())
     ]
     return late, tuple(cut)
+
+
+def _silent(found: Evaluation, logged: Sequence[LoggedRival]) -> dict[str, str]:
+    """Rivals in the log that are in no log, missing in some, or never on.
+
+    Raises
+    ------
+    SignalError
+        If no log has the channel of a rival.
+    """
+    from aqualog.core.errors import SignalError
+
+    out: dict[str, str] = {}
+    for r in logged:
+        values = [x.heard[r.name] for x in found.records if r.name in x.heard]
+        absent = [x for x in found.records if r.name not in x.heard]
+        if absent and not values:
+            why = next(n for n in absent[0].notes if n.startswith(f"rival {r.name}: "))
+            raise SignalError(
+                why, where=absent[0].name, expected="a channel of the logs", hint="`aqualog inspect LOG` lists them"
+            )
+        runs = [x.detectors[r.name] for x in found.records if r.name in x.detectors]
+        is_on = any(c.events or c.hit for d in runs for c in d.cells.values()) or any(d.false_alarms for d in runs)
+        lines = []
+        if absent:
+            lines.append(f"not in {len(absent)} of {len(found.records)} drives, the first is {absent[0].name}")
+        if values and not is_on:
+            low, high = min(v[0] for v in values), max(v[1] for v in values)
+            level = "" if r.level is None else f", level {r.sign}{r.level:g}"
+            lines.append(
+                f'channel "{r.channel}" is never on: its values are {low:g} ... {high:g}{level}; expected one that is '
+                f"true somewhere; try: --rival '{r.name}={r.channel}>=LEVEL'"
+            )
+        if lines:
+            out[f"rival {r.name}"] = "; ".join(lines)
+    return out

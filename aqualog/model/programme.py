@@ -9,11 +9,11 @@ from typing import Any
 from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import Vehicle
 from aqualog.model.drawing import KMH, slalom_angle
-from aqualog.model.effects import EFFECTS
+from aqualog.model.run import Run
 from aqualog.model.scenario import Lane, Profile, Scenario, Steering
 from aqualog.model.situations import SITUATIONS, TUNING_POOL, Drawn, draw
-from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
+from aqualog.model.tyre_tests import braking_test, curve_test, straight_test
 
 __all__ = ["PROGRAMMES", "SCENES", "Run", "scene", "situations", "thesis"]
 
@@ -40,25 +40,6 @@ BINNED = (60, 70, 80, 90, 100, 110)
 BINS = (65, 75, 85, 95, 105, 115)  # middles of the bins of 10 km/h in which slopes are estimated
 REGRESSED = (0.0, 0.25, 0.5, 0.75, 1.0)  # [m/s^2] constant speed hardly varies the traction, one run is no interval
 WEAR = {"very_worn_summer": "very_worn", "worn_summer": "worn", "new_summer": "new", "new_winter": "new"}
-PlainTerm = tuple[str, tuple[tuple[str, float], ...], str | None]  # effect, values, place
-
-
-@dataclass(frozen=True, slots=True)
-class Run:
-    """One drive of a programme: its name (a file's stem), the drive, and its row in the campaign."""
-
-    name: str
-    scenario: Scenario
-    manoeuvre: str
-    figures: str  # figures of the thesis that it serves
-    water_depth: float  # [m] nominal, right track; 0 for a dry run
-    terms: tuple[PlainTerm, ...] = ()  # of the model, as data that another process can be given
-    vehicle: Vehicle | None = None  # as the vehicle file has it; None: as it is driven
-
-    @property
-    def model(self) -> Model:
-        """Return the model that the terms make."""
-        return Model(tuple(Term(EFFECTS[name], dict(values), where) for name, values, where in self.terms))
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +79,10 @@ def _of_situation(d: Drawn) -> Run:
     return Run(f"{d.name}_1", d.scenario, d.name, "", depth, given, d.believed)
 
 
-PROGRAMMES = {"thesis": thesis, "situations": situations}
+PROGRAMMES: dict[str, Callable[[], tuple[Run, ...]]] = {
+    "thesis": thesis, "situations": situations, "straight-test": straight_test, "curve-test": curve_test,
+    "braking-test": braking_test,
+}  # fmt: skip
 
 _Drive = tuple[_Case, float, float, int, str, str]
 

@@ -86,11 +86,16 @@ class Kick:
 
 @dataclass(frozen=True, slots=True)
 class Steering:
-    """Sinusoidal steering: amplitude of the mean road-wheel angle [rad], period [s], start [s]."""
+    """Steering by an angle over time: amplitude of the mean road-wheel angle [rad], period [s], start [s].
+
+    `sine` swings about straight ahead. `hold` rises within half a period and stays: a circle. `lane_change`: a
+    period to one side, a period straight ahead, a period back.
+    """
 
     amplitude: float
     period_s: float
     start_s: float = 1.0
+    kind: Literal["sine", "hold", "lane_change"] = "sine"
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +131,7 @@ class Scenario:
     excitation: Excitation | None = None
     brake_torque: Profile = ()  # [N m] sum of all wheels
     extra_torque: Profile = ()  # [N m] drive torque on top of the driver's, sum of the driven wheels
+    vectoring: Profile = ()  # [N m] from the left to the right wheel of the (rear) driven axle
     split_rear: Profile = ()  # rear share of the drive torque over time; empty: the vehicle's
     grade: Profile = ()  # (s [m], slope angle [rad]) over the position
     head_wind: float = 0.0  # [m/s]

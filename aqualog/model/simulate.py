@@ -132,10 +132,22 @@ def run_kernel(setup: Setup, *, dt: float, every: int) -> FloatArray:
         )
     controls = _controls(scenario, n, dt)
     road = build_road(scenario, float(np.max(controls.v_target)) * 1.3 * scenario.duration_s + 50.0)
-    rows = kernel.run(n, dt, every, _start(plant, controls, float(road.fields[0, GRADE])), plant, road, controls)
+    start = _start(plant, controls, float(road.fields[0, GRADE]))
+    rows = kernel.run(n, dt, every, start, plant, road, controls, _vectored(scenario, n, dt))
     if not np.isfinite(rows).all():
         raise ConfigError("the simulation diverged", hint="less extreme parameters of car, tyre, lane or model")
     return rows
+
+
+def _vectored(scenario: Scenario, n: int, dt: float) -> FloatArray:
+    """Torque on top at each wheel. (n + 1, 4) [N·m]"""
+    if not scenario.vectoring:
+        return kernel.NO_TORQUE
+    moved = _profile(scenario.vectoring, np.arange(n + 1, dtype=np.float64) * dt)
+    applied = np.zeros((n + 1, 4))
+    left = 0 if scenario.vehicle.drivetrain == "fwd" else 2
+    applied[:, left], applied[:, left + 1] = -moved, moved
+    return applied
 
 
 def _profile(pairs: Profile, t: FloatArray) -> FloatArray:
@@ -152,6 +164,11 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
         phase = np.maximum(t - steering.start_s, 0.0) * (2.0 * np.pi / steering.period_s)
         # half a lobe of half the height first, so that the heading swings about straight ahead
         steer = steering.amplitude * np.sin(phase) * np.where(phase < np.pi, 0.5, 1.0)
+        if steering.kind == "hold":
+            steer = steering.amplitude * 0.5 * (1.0 - np.cos(np.minimum(phase, np.pi)))
+        elif steering.kind == "lane_change":
+            part = np.floor(phase / (2.0 * np.pi))
+            steer = steering.amplitude * np.sin(phase) * ((part == 0.0) * 1.0 - (part == 2.0) * 1.0)
     split = (
         _profile(scenario.split_rear, t) if scenario.split_rear else np.full(n + 1, scenario.vehicle.torque_split_rear)
     )

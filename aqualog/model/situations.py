@@ -14,6 +14,7 @@ from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.model.drawing import SCORING_POOL, TUNING_POOL, Drawing, Drawn, Pool, Taken
 from aqualog.model.plant import build_plant
 from aqualog.model.scenario import Scenario
+from aqualog.model.situations_chassis import CHASSIS
 from aqualog.model.situations_made import DRY, FAULTS, WATER
 
 __all__ = ["SCORING_POOL", "SITUATIONS", "TUNING_POOL", "Drawn", "Pool", "Situation", "believed_vehicle", "draw"]
@@ -34,7 +35,7 @@ class Situation:
 
 SITUATIONS: dict[str, Situation] = {
     **{n: Situation(n, title, "aquaplaning", make) for n, (title, make) in WATER.items()},
-    **{n: Situation(n, title, "nuisance", make) for n, (title, make) in (DRY | FAULTS).items()},
+    **{n: Situation(n, title, "nuisance", make) for n, (title, make) in (DRY | FAULTS | CHASSIS).items()},
 }
 
 

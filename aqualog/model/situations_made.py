@@ -13,7 +13,7 @@ from aqualog.model.sensors import ESC, SensorFault
 from aqualog.model.term import Model
 from aqualog.physics.load import G
 
-__all__ = ["DRY", "FAULTS", "WATER"]
+__all__ = ["DRY", "FAULTS", "WATER", "Makers"]
 
 Makers = dict[str, tuple[str, Callable[[Drawing], Taken]]]  # name -> title, and what makes the drive of a drawing
 

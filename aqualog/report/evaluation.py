@@ -7,7 +7,6 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from aqualog import __version__
-from aqualog.detect.registry import RIVALS
 from aqualog.evaluate.gates import GateResult
 from aqualog.evaluate.records import Cell as Counts
 from aqualog.evaluate.records import RunRecord
@@ -21,6 +20,7 @@ from aqualog.evaluate.score import (
     confusion,
     coverage,
     grouped,
+    is_rival,
     score_all,
     situation_scores,
 )
@@ -139,7 +139,7 @@ def _facts(evaluation: Evaluation) -> list[tuple[str, str]]:
 def _score_rows(scores: Mapping[str, Score]) -> list[tuple[str | Cell, ...]]:
     return [
         (
-            Cell(title_of(n), note="rival" if n in RIVALS else ""),
+            Cell(title_of(n), note="rival" if is_rival(n) else ""),
             str(s.runs),
             recall_text(s.full),
             recall_text(s.partial),

@@ -6,10 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from aqualog.detect.registry import RIVALS
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.run import Evaluation
-from aqualog.evaluate.score import Score, score_all, situation_scores
+from aqualog.evaluate.score import Score, is_rival, score_all, situation_scores
 from aqualog.evaluate.sweep import RocPoint
 from aqualog.report.evaluation_words import short
 from aqualog.report.figures import GOOD_TO_BAD, PALETTE, axis, figure, heat, line
@@ -115,9 +114,9 @@ def _matrix(records: Sequence[RunRecord], value: Any, title: str) -> dict[str, A
 
 def _line(name: str, names: Sequence[str], x: Sequence[float], y: Sequence[float], **more: Any) -> dict[str, Any]:
     """A detector's line: its colour within its kind, dotted for a rival."""
-    is_rival = name in RIVALS
-    kind = [n for n in names if (n in RIVALS) == is_rival]
+    dotted = is_rival(name)
+    kind = [n for n in names if is_rival(n) == dotted]
     colour = PALETTE[kind.index(name) % len(PALETTE)]
-    style = {"dash": "dot" if is_rival else "solid", **more.pop("style", {})}
+    style = {"dash": "dot" if dotted else "solid", **more.pop("style", {})}
     marker = {"color": colour, "size": 5}
     return line(name.replace("_", " "), x, y, colour, width=1.6, style=style, marker=marker, **more)

@@ -18,6 +18,7 @@ from aqualog.evaluate.score import (
     Score,
     better_rivals,
     coverage,
+    is_rival,
     score_all,
     situation_scores,
 )
@@ -37,9 +38,11 @@ _MEASURES = {
 
 
 def title_of(detector: str) -> str:
-    """`spin_down` -> `spin-down`; a rival with its reference."""
+    """`spin_down` -> `spin-down`; a rival with its reference, one in the log by its name."""
     if detector in RIVALS:
         return f"{RIVALS[detector].title} {RIVALS[detector].reference}"
+    if is_rival(detector):
+        return detector
     return detector.replace("_", " ")
 
 
@@ -155,7 +158,7 @@ def coverage_sentences(records: Sequence[RunRecord]) -> list[str]:
 
 def better_sentences(records: Sequence[RunRecord]) -> list[str]:
     """Cases in which a rival is better than the thesis' method, or a sentence that there is no such case."""
-    if not any(n in RIVALS for r in records for n in r.detectors):
+    if not any(is_rival(n) for r in records for n in r.detectors):
         return []
     found = better_rivals(records)
     if not found:

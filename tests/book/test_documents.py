@@ -24,6 +24,9 @@ MONDAY, FRIDAY = (str(SAMPLES / f"loaded_{day}.parquet") for day in ("monday", "
 PAGE = (DOCS / "reference" / "documents.md").read_text(encoding="utf-8")
 
 
+TESTS = ("test straight", "test curve", "test braking")
+
+
 def complaints(name, document):
     stored = json.loads((DOCS / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8"))
     validator = jsonschema.Draft202012Validator(stored)
@@ -45,7 +48,9 @@ def test_no_schema_is_left_over():
     assert {p.name for p in (DOCS / "schemas").iterdir()} == {f"{n}.schema.json" for n in DOCUMENTS}
 
 
-@pytest.mark.parametrize("command", [*(c for c in COMMANDS if c != "campaign"), "campaign init"])
+@pytest.mark.parametrize(
+    "command", [*(c for c in COMMANDS if c not in ("campaign", "test", "watch")), "campaign init", *TESTS]
+)
 def test_every_command_that_prints_json_has_a_document(command):
     shown = CliRunner().invoke(app, [*command.split(), "--help"], env={"COLUMNS": "200", "NO_COLOR": "1"})
     has_document = any(f"{d.heading} ".startswith(f"aqualog {command} ") for d in DOCUMENTS.values())
@@ -89,6 +94,7 @@ DRIVES = {
     "doctor": ("doctor", MF4, *CAR),
     "cache": ("cache",),
     "calibrate": ("calibrate", MONDAY, FRIDAY, *CAR),
+    "validate": ("validate", MONDAY, *CAR, "--no-why"),
 }
 
 
@@ -248,6 +254,11 @@ CONTRACT = {
     "bin_slipslope": "rows[].wheel rows[].v_low_kmh rows[].v_high_kmh rows[].runs rows[].samples rows[].slope "
     "rows[].slope_ci95 rows[].intercept rows[].r2",
     "bin_resistance": "rows[].v_low_kmh rows[].v_high_kmh rows[].runs rows[].samples rows[].delta_a_x rows[].delta_a_x_ci95",
+    "test_straight": "runs[].log runs[].v_15_kmh runs[].censored runs[].valid runs[].reason sets[].tyre sets[].runs "
+    "sets[].mean_kmh sets[].ci95 sets[].cv sets[].index sets[].index_ci95",
+    "test_curve": "runs[].log runs[].valid runs[].reason sets[].tyre sets[].runs sets[].ci95 sets[].index sets[].index_ci95",
+    "test_braking": "runs[].log runs[].bfc runs[].valid runs[].reason sets[].tyre sets[].runs sets[].mean sets[].ci95 "
+    "sets[].cv sets[].index sets[].index_ci95",
     "diagnose": "verdict causes[].effect causes[].where causes[].parameters.NAME.value causes[].parameters.NAME.ci95 "
     "causes[].parameters.NAME.unit causes[].explains causes[].sentence alternatives unexplained[].channel "
     "unexplained[].depends_on unexplained[].share gain.channel.NAME.rmse_before gain.channel.NAME.rmse_after "

@@ -11,10 +11,11 @@ from aqualog.book.__main__ import generated
 from aqualog.book.markdown import table, units
 from aqualog.book.reference import PAGES
 from aqualog.book.reference.model import EFFECTS_EXAMPLE, vehicle_example
-from aqualog.book.reference.settings import MAP_EXAMPLE, THRESHOLDS_EXAMPLE
+from aqualog.book.reference.settings import BOUNDARIES_EXAMPLE, MAP_EXAMPLE, THRESHOLDS_EXAMPLE
 from aqualog.book.topics import DOCS
 from aqualog.campaign.definition import GROUP_NAMES
 from aqualog.cli.commands import loaded
+from aqualog.config.boundary import BOUNDARY_KEYS, load_boundaries
 from aqualog.config.campaign import CAMPAIGN_KEYS, RUN_KEYS
 from aqualog.config.labels import LABEL_KEYS
 from aqualog.config.model import load_model
@@ -85,6 +86,7 @@ NAMES = {
     "scenario": [*SCENARIO_KEYS, *TYRE_KEYS, *TYRES],
     "effects": [*EFFECTS, *EMPIRICAL, *(p.name for e in EFFECTS.values() for p in e.parameters), "knots", "where"],
     "thresholds": [*DETECTORS, *RIVALS, *(k.name for k in JOINT_KEYS), *TUNING._asdict()],
+    "boundaries": [k.name for k in BOUNDARY_KEYS],
     "exit_codes": [str(int(c)) for c in ExitCode],
     "python": [f"aq.{n}" for n in aqualog.__all__ if not n.startswith("__")],
 }  # fmt: skip
@@ -136,6 +138,8 @@ def test_the_other_examples_load(tmp_path):
     assert len(load_model(tmp_path / "m.toml").terms) == 2
     (tmp_path / "t.toml").write_text(THRESHOLDS_EXAMPLE)
     load_thresholds(tmp_path / "t.toml")
+    (tmp_path / "b.toml").write_text(BOUNDARIES_EXAMPLE)
+    assert [p.name for p in load_boundaries(tmp_path / "b.toml").plots] == ["a_x over t", "a_y over steer_angle"]
     assert load_settings(tmp_path / "t.toml").joint_cusum.with_slope is False
 
 

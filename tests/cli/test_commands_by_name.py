@@ -30,7 +30,7 @@ def test_all_are_listed_in_their_order():
 def test_an_unknown_name_is_told_with_the_nearest():
     wrong = run("detekt")
     assert wrong.exit_code == 2
-    assert "Did you mean 'detect'?" in wrong.stderr
+    assert "Did you mean 'detect'" in wrong.stderr
 
 
 HELP_OF_ALL = """
@@ -54,7 +54,7 @@ def test_help_has_examples_and_loads_nothing_heavy():
     assert "Commands:" in first
     assert {m for m in loaded if m.startswith("aqualog.cli.")} == {f"aqualog.cli.{m}" for m in ("main", "commands")}
     for name, text in zip(COMMANDS, others[::2], strict=True):
-        assert name == "campaign" or f"aqualog {name}" in text.split("Examples:")[1], name
+        assert name in ("campaign", "test") or f"aqualog {name}" in text.split("Examples:")[1], name
     heavy = {"numpy", "polars", "numba", "plotly", "jinja2", "scipy", "asammdf", "mcap"}
     assert not heavy & set(others[-1].split())
 

@@ -15,7 +15,7 @@ FACE_OF = {
     "slip-slope": "slip_slope", "batch": "Campaign.run", "plan": "Campaign.plan", "bin-slipslope": "Campaign.run",
     "bin-resistance": "Campaign.run", "report": "Campaign.run", "calibrate": "calibrate", "diagnose": "diagnose",
     "evaluate": "evaluate", "simulate": "simulate", "figures": "thesis.figures", "reproduce": "thesis.reproduce",
-    "cache": "cache", "campaign": "Campaign.propose",
+    "cache": "cache", "campaign": "Campaign.propose", "test": "tyre_test", "validate": "validate", "watch": "watch",
 }  # fmt: skip
 
 
@@ -24,7 +24,7 @@ def test_names():
     assert set(aq.__all__) == {
         "AqualogError", "Campaign", "Drive", "Model", "Signals", "Vehicle", "__version__", "align", "cache",
         "calibrate", "convert", "detect", "diagnose", "doctor", "evaluate", "init", "inspect", "physics", "read", "simulate",
-        "slip_slope", "thesis",
+        "slip_slope", "thesis", "tyre_test", "validate", "watch",
     }  # fmt: skip
 
 

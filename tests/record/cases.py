@@ -141,6 +141,11 @@ ONE_DRIVE = (
         f"diagnose {S}/loaded_monday.parquet {CAR} --holdout {S}/loaded_friday.parquet --surrogates 9 --json "
         "-o {o}/model.toml --page {o}/page.html",
     ),
+    Case("validate", f"validate {S}/lane_drive.mf4 {CAR} --no-why --json"),
+    Case(
+        "validate_text", f"validate {S}/loaded_monday.parquet {S}/loaded_friday.parquet {CAR} --no-why --method 18571"
+    ),
+    Case("watch", f"watch {S} --campaign {THESIS} --once --json", keep="none/*"),
     Case("diagnose_text", f"diagnose {S}/loaded_friday.parquet {CAR} --no-bootstrap"),
     Case("diagnose_model", f"diagnose {S}/loaded_monday.parquet {CAR} --model given/model.toml --no-bootstrap --json"),
     Case("diagnose_wet", f"diagnose {S}/lane_drive.mf4 {CAR} --no-bootstrap --json"),
@@ -167,6 +172,7 @@ ONE_DRIVE = (
 PROGRAMMES = (
     Case("simulate_situations", "simulate campaign situations -o situations --jobs 2"),
     Case("simulate_thesis", "simulate campaign thesis -o thesis --jobs 2"),
+    Case("simulate_braking", "simulate campaign braking-test -o braking --jobs 2"),
 )
 
 CAMPAIGNS = (
@@ -186,6 +192,8 @@ CAMPAIGNS = (
     Case("evaluate_tune", f"evaluate {THESIS} --tune {{o}}/thresholds.toml --json"),
     Case("evaluate_text", f"evaluate {THESIS}"),
     Case("evaluate_situations", "evaluate situations/campaign.toml --json"),
+    Case("test_straight_drive", f"test straight {S}/lane_drive.mf4 {CAR} --json"),
+    Case("test_braking", "test braking braking/campaign.toml --control worn_summer --json -o {o}/out"),
     Case("diagnose_campaign", f"diagnose {THESIS} --surrogates 9 --json --page {{o}}/page.html"),
     Case("figures_campaign", f"figures 2 --campaign {THESIS} -o {{o}} --format csv --json"),
     Case("figures_2", "figures 2 -o {o} --format csv --json"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aqualog.book.documents import campaigns, drives, judged
+from aqualog.book.documents import campaigns, drives, judged, trade, validated
 from aqualog.book.documents.fields import Document
 
 __all__ = ["DOCUMENTS"]
@@ -12,8 +12,9 @@ DOCUMENTS: dict[str, Document] = {
     for d in (
         drives.DETECT, drives.SLIP_SLOPE, drives.INIT, drives.INSPECT, drives.DOCTOR, drives.ALIGN, drives.CALIBRATE,
         judged.DIAGNOSE, judged.EVALUATE, drives.SIMULATE, campaigns.INIT, campaigns.INSPECT, campaigns.BATCH,
-        campaigns.PLAN, campaigns.BIN_SLIP_SLOPE, campaigns.BIN_RESISTANCE, judged.FIGURES, judged.REPRODUCE,
-        drives.CACHE, campaigns.MANIFEST, campaigns.HISTORY,
+        campaigns.PLAN, campaigns.BIN_SLIP_SLOPE, campaigns.BIN_RESISTANCE, trade.STRAIGHT, trade.CURVE, trade.BRAKING,
+        judged.FIGURES, judged.REPRODUCE, drives.CACHE, validated.VALIDATE, campaigns.MANIFEST,
+        campaigns.HISTORY,
     )
 }  # fmt: skip
 """By name, which is that of the schema file too."""

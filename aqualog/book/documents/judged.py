@@ -246,6 +246,7 @@ EVALUATE = Document(
         mapping("thresholds", "threshold of each detector", number("", "unit of the statistic", "")),
         mapping("rivals", "threshold of each rival; null without `--rivals`", number("", "unit of the statistic", ""),
                 null=True),
+        mapping("logged", "channel, and level, of each `--rival` in the log", text("", "")),
         by_name("detectors", "score of each detector", _SCORE),
         rows("by", "the same per configuration, with `--by`", (
             mapping("groups", "value of each key; null where a run does not say", text("", "", null=True)),

@@ -8,8 +8,8 @@ __all__ = ["PAGES", "page"]
 
 PAGES = {
     "commands": "commands", "signals": "signals", "map": "settings", "vehicle": "model", "campaign": "settings",
-    "scenario": "settings", "thresholds": "settings", "effects": "model", "documents": "documents",
-    "exit_codes": "machine", "environment": "machine", "python": "python",
+    "scenario": "settings", "thresholds": "settings", "boundaries": "settings", "effects": "model",
+    "documents": "documents", "exit_codes": "machine", "environment": "machine", "python": "python",
 }  # fmt: skip
 """Name of a page -> module that makes it."""
 

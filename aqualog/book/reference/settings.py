@@ -1,9 +1,10 @@
-"""Pages of the files that a user writes: signal map, campaign file, scenario, thresholds."""
+"""Pages of the files that a user writes: signal map, campaign file, scenario, thresholds, boundaries."""
 
 from __future__ import annotations
 
 from aqualog.book.markdown import code, fence, number, page, table
 from aqualog.campaign.definition import GROUP_NAMES
+from aqualog.config.boundary import BOUNDARY_KEYS
 from aqualog.config.campaign import CAMPAIGN_KEYS, RUN_KEYS
 from aqualog.config.labels import LABEL_KEYS
 from aqualog.config.reader import Key
@@ -14,8 +15,13 @@ from aqualog.detect.registry import RIVALS, all_of
 from aqualog.detect.slip_slope.tuning import MEANINGS as TUNING_MEANINGS
 from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.model.tyre import TYRE_KEYS, TYRES
+from aqualog.trade.limits import described
+from aqualog.validate.records import PLOTS
 
-__all__ = ["MAP_EXAMPLE", "THRESHOLDS_EXAMPLE", "campaign_page", "map_page", "scenario_page", "thresholds_page"]
+__all__ = [
+    "BOUNDARIES_EXAMPLE", "MAP_EXAMPLE", "THRESHOLDS_EXAMPLE", "boundaries_page", "campaign_page", "map_page",
+    "scenario_page", "thresholds_page",
+]  # fmt: skip
 
 _MAP = "A signal map says which channel of a log is which signal, and in which unit."
 _MAP_HOW = """
@@ -249,12 +255,19 @@ k is 1/C, beta the slope ratio of the axles, delta the slip offset.
 """
 
 
+_TESTS = (
+    "`aqualog test` has a file of its own, which names only what differs: `[straight]`, below it `yaw_rate = 0.08`. "
+    "K: general knowledge."
+)
+
+
 def thresholds_page() -> str:
     """The page."""
     own = [(code(d.name), d.unit, f"{d.threshold:g}", d.meaning) for d in all_of("effect", "joint")]
     rivals = [(code(r.name), r.unit, f"{r.threshold:g}", f"{r.title} {r.reference}") for r in RIVALS.values()]
     joint = [(code(k.name), k.kind, str(k.default), k.meaning) for k in JOINT_KEYS]
     tuning = [(code(n), unit, _shown(getattr(TUNING, n)), meaning) for n, (unit, meaning) in TUNING_MEANINGS.items()]
+    tests = [(code(d.path), d.unit, f"{d.value:g}", d.meaning, d.source) for d in described()]
     return page(
         "Thresholds file",
         _THRESHOLDS,
@@ -272,8 +285,56 @@ def thresholds_page() -> str:
         "## Tuning of the slip-slope filter",
         _TUNING,
         table(("name", "unit", "value", "meaning"), tuning),
+        "## Tyre tests: `--limits`",
+        _TESTS,
+        table(("key", "unit", "default", "meaning", "source"), tests),
     )
 
 
 def _shown(value: float) -> str:
     return str(value).lower() if isinstance(value, bool) else f"{value:g}"
+
+
+_BOUNDARIES = "A boundaries file says how far a measured car may be from its simulation."
+_BOUNDARIES_HOW = """
+Give it to `aqualog validate` with `--boundaries boundaries.toml`. A plot of the file takes the place of the built-in
+one with the same y and x. Numbers of a standard come from your own copy of it: none is built in.
+"""
+BOUNDARIES_EXAMPLE = """
+agreed = 0.95
+built_in = false
+
+[[plot]]
+y = "a_x"
+x = "t"
+x_offset = 0.1
+y_offset = 0.15
+y_gain = 0.05
+
+[[plot]]
+y = "a_y"
+x = "steer_angle"
+x_offset = 0.002
+y_offset = 0.2
+"""
+
+
+def boundaries_page() -> str:
+    """The page."""
+    keys = [
+        (code(k.name), k.kind, k.unit, "" if k.default is None else str(k.default), k.meaning) for k in BOUNDARY_KEYS
+    ]
+    own = [
+        (p.y, p.x, number(p.tolerance.x_offset), number(p.tolerance.y_offset), number(p.tolerance.y_gain))
+        for p in PLOTS
+    ]
+    return page(
+        "Boundaries file",
+        _BOUNDARIES,
+        _BOUNDARIES_HOW,
+        fence(BOUNDARIES_EXAMPLE, "toml"),
+        "## Keys",
+        table(("key", "type", "unit", "default", "meaning"), keys),
+        "## Built-in plots",
+        table(("y", "x", "x_offset", "y_offset", "y_gain"), own),
+    )

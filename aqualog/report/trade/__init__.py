@@ -1,0 +1,1 @@
+"""Tyre tests for a reader: JSON, text, page."""

@@ -1,0 +1,230 @@
+"""Passes of one tyre through the trough: curves over speed, the speeds read from them, one number with an interval."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from aqualog.core.intervals import NOWHERE, Interval
+from aqualog.core.records import FloatArray
+from aqualog.trade.concave import area_under, concave_fit, falls_to
+from aqualog.trade.control import Estimate
+from aqualog.trade.curve import KMH, CurvePass
+from aqualog.trade.limits import CurveLimits
+
+__all__ = ["RESULTS", "CurveResult", "CurveSet", "common_speeds", "curve_set"]
+
+CurveResult = Literal["min", "mean", "area"]
+RESULTS: dict[CurveResult, tuple[str, str]] = {
+    "min": ("m/s^2", "least lateral acceleration in the trough, mean over the common speeds"),
+    "mean": ("m/s^2", "mean lateral acceleration in the trough, mean over the common speeds"),
+    "area": ("m/s^2 km/h", "area under the mean lateral acceleration in the trough between the common speeds"),
+}
+"""Unit and meaning of the number that is compared between sets."""
+DRAWS = 400
+SEED = 4_711
+
+
+@dataclass(frozen=True, slots=True)
+class CurveSet:
+    """Curves of a set over the entry speed, and what is read from them.
+
+    Attributes
+    ----------
+    v : array (m,)
+        Mean entry speed of each step. [m/s]
+    least, mean, dry : array (m,)
+        Concave fits of least and mean lateral acceleration in the trough, and means of the dry one. [m/s²] The fits end
+        at the first step at which the least one is 0; beyond it the steps' means stand.
+    result, ci, estimate
+        The number of `RESULTS` with its interval, and the same with its variance.
+    v_greatest, v_half, v_zero : (value, interval)
+        Speed of the greatest mean acceleration, speeds at which the least one is half of the dry one, and 0. [m/s] NaN
+        where the passes do not reach that.
+    passes, valid : int
+    notes : tuple of str
+    """
+
+    v: FloatArray
+    least: FloatArray
+    mean: FloatArray
+    dry: FloatArray
+    result: float = math.nan
+    ci: Interval = NOWHERE
+    estimate: Estimate = field(default=Estimate(math.nan, math.nan, 0.0))
+    v_greatest: tuple[float, Interval] = (math.nan, NOWHERE)
+    v_half: tuple[float, Interval] = (math.nan, NOWHERE)
+    v_zero: tuple[float, Interval] = (math.nan, NOWHERE)
+    passes: int = 0
+    valid: int = 0
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Steps:
+    """Valid passes, by the step of speed that each belongs to."""
+
+    step: FloatArray
+    v: FloatArray
+    least: FloatArray
+    mean: FloatArray
+    dry: FloatArray
+
+    def means(self, x: FloatArray) -> FloatArray:
+        return np.array([x[self.step == s].mean() for s in np.unique(self.step)])
+
+
+def common_speeds(sets: Sequence[Sequence[CurvePass]], limits: CurveLimits) -> Interval:
+    """Return the speeds that all sets have driven. [m/s] NaN without any."""
+    ends = [(float(v[0]), float(v[-1])) for v in (_speeds(p, limits) for p in sets) if v.size]
+    low, high = max((e[0] for e in ends), default=math.nan), min((e[1] for e in ends), default=math.nan)
+    return (low, high) if low <= high else NOWHERE
+
+
+def curve_set(
+    passes: Sequence[CurvePass], limits: CurveLimits, *, result: CurveResult, between: Interval, level: float = 0.95
+) -> CurveSet:
+    """Summarise the passes of a set.
+
+    Parameters
+    ----------
+    passes : sequence of CurvePass
+        All of the set; those that are not valid do not count.
+    result : str
+        `min`, `mean` or `area`.
+    between : (float, float)
+        Common speeds over which `result` is taken. [m/s]
+    level : float
+        Confidence.
+
+    Notes
+    -----
+    Passes whose speeds round to the same multiple of `limits.speed_step` are one step. The interval is from 400
+    bootstrap draws of the passes of each step; deviations from a step's mean of n passes are widened by
+    sqrt(n / (n - 1)), since its mean is its own. A step of one pass takes the deviations of the others.
+    """
+    good = _steps([p for p in passes if p.valid], limits)
+    empty = np.zeros(0)
+    if not good.v.size:
+        return CurveSet(empty, empty, empty, empty, passes=len(passes), notes=("no pass is valid",))
+    v = good.means(good.v)
+    curves = _curves(good, v, good.least, good.mean, limits.a_y_zero)
+    own = _read(v, *curves, good.means(good.dry), limits, result, between)
+    draws = _draws(good, v, limits, result, between)
+    spread = draws.std(axis=0, ddof=1) if draws.size else np.full(4, np.nan)
+    tail = 0.5 * (1.0 - level)
+
+    def interval(k: int) -> Interval:
+        seen = draws[np.isfinite(draws[:, k]), k] if draws.size else draws
+        if not draws.size or not math.isfinite(own[k]) or seen.size < 0.5 * DRAWS:
+            return NOWHERE
+        low, high = np.quantile(seen, (tail, 1.0 - tail))
+        return float(low), float(high)
+
+    dof = float(good.v.size - v.size)
+    return CurveSet(
+        v, *curves, good.means(good.dry), own[0], interval(0), Estimate(own[0], float(spread[0]) ** 2, dof),
+        (own[1], interval(1)), (own[2], interval(2)), (own[3], interval(3)), len(passes), int(good.v.size),
+        _notes(good, v, own, between, limits),
+    )  # fmt: skip
+
+
+def _step_of(v: float, limits: CurveLimits) -> float:
+    return round(v / KMH / limits.speed_step) * limits.speed_step
+
+
+def _steps(passes: Sequence[CurvePass], limits: CurveLimits) -> _Steps:
+    def of(name: str) -> FloatArray:
+        return np.array([float(getattr(p, name)) for p in passes])
+
+    steps = np.array([_step_of(p.v_entry, limits) for p in passes])
+    return _Steps(steps, of("v_entry"), of("a_y_least"), of("a_y_mean"), of("a_y_dry"))
+
+
+def _speeds(passes: Sequence[CurvePass], limits: CurveLimits) -> FloatArray:
+    good = _steps([p for p in passes if p.valid], limits)
+    return good.means(good.v) if good.v.size else good.v
+
+
+def _curves(
+    good: _Steps, v: FloatArray, least: FloatArray, mean: FloatArray, zero: float
+) -> tuple[FloatArray, FloatArray]:
+    """Fit both curves up to the step at which the least acceleration is 0: from there on it need not be concave.
+
+    The passes stand at their step's mean speed, so that no fit looks beyond its ends.
+    """
+    means = [good.means(x) for x in (least, mean)]
+    gone = np.flatnonzero(means[0] <= zero)
+    end = int(gone[0]) + 1 if gone.size else v.size
+    place = np.searchsorted(np.unique(good.step), good.step)
+    is_fitted = place < end
+    fits = [concave_fit(v[place[is_fitted]], x[is_fitted], v[:end]) for x in (least, mean)]
+    found = [np.concatenate([f, m[end:]]) for f, m in zip(fits, means, strict=True)]
+    return found[0], found[1]
+
+
+def _read(
+    v: FloatArray, least: FloatArray, mean: FloatArray, dry: FloatArray, limits: CurveLimits, result: CurveResult,
+    between: Interval,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Return the result, and the speeds of the greatest, the half and no lateral acceleration."""
+    low, high = between
+    curve = least if result == "min" else mean
+    if not math.isfinite(low + high):
+        value = math.nan
+    elif result == "area":
+        value = area_under(v, curve, low, high) / KMH
+    elif high > low:
+        value = area_under(v, curve, low, high) / (high - low)
+    else:
+        value = float(np.interp(low, v, curve))
+    return value, float(v[np.argmax(mean)]), falls_to(v, least, 0.5 * dry), falls_to(v, least, limits.a_y_zero)
+
+
+def _draws(good: _Steps, v: FloatArray, limits: CurveLimits, result: CurveResult, between: Interval) -> FloatArray:
+    """Return what is read from each bootstrap draw (b, 4); empty where no step has two passes."""
+    steps = np.unique(good.step)
+    members = [np.flatnonzero(good.step == s) for s in steps]
+    if not any(m.size > 1 for m in members):
+        return np.zeros((0, 4))
+    away = {name: np.zeros(good.v.size) for name in ("least", "mean")}
+    for name, x in away.items():
+        y = getattr(good, name)
+        for m in (m for m in members if m.size > 1):
+            x[m] = (y[m] - y[m].mean()) * math.sqrt(m.size / (m.size - 1.0))
+    several = np.concatenate([m for m in members if m.size > 1])
+    rng = np.random.default_rng(SEED)
+    dry = good.means(good.dry)
+    found = []
+    for _ in range(DRAWS):
+        drawn = np.concatenate([rng.choice(m if m.size > 1 else several, m.size) for m in members])
+        own = np.concatenate(members)
+        made = {n: np.zeros(good.v.size) for n in away}
+        for name in away:
+            y = getattr(good, name)
+            level = np.concatenate([np.full(m.size, y[m].mean()) for m in members])
+            made[name][own] = level + away[name][drawn]
+        found.append(
+            _read(v, *_curves(good, v, made["least"], made["mean"], limits.a_y_zero), dry, limits, result, between)
+        )
+    return np.array(found)
+
+
+def _notes(
+    good: _Steps, v: FloatArray, own: tuple[float, float, float, float], between: Interval, limits: CurveLimits
+) -> tuple[str, ...]:
+    notes = []
+    few = [f"{s:g} km/h" for s in np.unique(good.step) if (good.step == s).sum() < limits.passes]
+    if few:
+        notes.append(f"fewer than {limits.passes:g} passes at {', '.join(few)}")
+    if not math.isfinite(between[0]):
+        notes.append("the sets have no speed in common")
+    elif between[1] <= between[0]:
+        notes.append("the sets have one speed in common: no area")
+    if not math.isfinite(own[3]):
+        notes.append(f"the least lateral acceleration does not reach 0 up to {3.6 * v[-1]:.0f} km/h")
+    return tuple(notes)

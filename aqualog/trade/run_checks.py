@@ -1,0 +1,126 @@
+"""Whether a run of the straight test is one: what was driven before the crossing."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from aqualog.core.records import BoolArray, FloatArray, Signals
+from aqualog.trade.lane import Span, mean_over
+from aqualog.trade.limits import StraightLimits
+
+__all__ = ["Looked", "Seen", "longest_gap", "look", "torque_fall"]
+
+_BEFORE_S = 1.0  # [s] over which the highest torque is taken
+_MEAN_S = 0.1  # [s]
+
+
+class Looked(NamedTuple):
+    """What is looked at: the lane, slip (n,) [-] and speed (n,) [m/s], the place of the crossing in samples (or of the
+    highest speed without one), and the driven wheels' torque (n,) [N·m].
+    """
+
+    span: Span
+    slip: FloatArray
+    v: FloatArray
+    stop: float
+    is_crossing: bool
+    torque: FloatArray
+
+
+class Seen(NamedTuple):
+    """Why a run is not valid, what could not be checked, mean acceleration [m/s²] and largest yaw rate [rad/s]."""
+
+    reasons: tuple[str, ...]
+    notes: tuple[str, ...]
+    a_x: float
+    yaw_rate: float
+
+
+def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
+    """Check a run by itself: gaps, entry, acceleration, yaw rate, shift, torque."""
+    t, dt = signals.array("t"), signals.dt
+    t_stop = float(np.interp(run.stop, np.arange(t.size), t))
+    until: BoolArray = (t >= run.span[0]) & (t <= t_stop)
+    reasons: list[str] = []
+    notes: list[str] = []
+    where = "before 15 %" if run.is_crossing else "before the highest speed"
+    gap = longest_gap(run.slip, until) * dt
+    if gap > limits.lost:
+        reasons.append(f"wheel speeds are missing for {gap:.2f} s {where}")
+    if run.is_crossing and t_stop - run.span[0] < limits.entry:
+        reasons.append(
+            f"15 % came {max(t_stop - run.span[0], 0.0):.2f} s after the lane began: the car entered it too fast"
+        )
+    if run.is_crossing and not np.isfinite(run.v[int(run.stop) : int(run.stop) + 2]).all():
+        reasons.append("the speed is missing at the crossing")
+    begin = max(t_stop - limits.a_x_window, run.span[0] - limits.dry)
+    a_x, source = _acceleration(signals, run.v, (t > begin) & (t <= t_stop))
+    if math.isnan(a_x):
+        reasons.append(f"the acceleration {where} is not known")
+    elif a_x < limits.a_x_least:
+        reasons.append(f"the acceleration {where} is {a_x:.2f} m/s²: no full throttle")
+    if source:
+        notes.append(source)
+    yaw = mean_over(signals.array("yaw_rate"), _MEAN_S, dt)[until]
+    largest = float(np.nanmax(np.abs(yaw))) if np.isfinite(yaw).any() else math.nan
+    if largest > limits.yaw_rate:
+        reasons.append(f"the yaw rate reaches {largest:.3f} rad/s {where}, at most {limits.yaw_rate:g} allowed")
+    if math.isnan(largest):
+        notes.append("no yaw_rate: whether the car ran straight is not checked, and the slip is not corrected for it")
+    shift = _shift(signals, t, t_stop, limits.shift)
+    if shift is None:
+        notes.append("no gear: shifts are not looked for")
+    elif shift:
+        reasons.append(f"the gear changes within {limits.shift:g} s of the crossing")
+    fall = torque_fall(mean_over(run.torque, _MEAN_S, dt), until, max(1, round(_BEFORE_S / dt)))
+    if math.isnan(fall):
+        notes.append("no torque of the driven wheels: whether it was cut is not checked")
+    elif fall > limits.torque_cut:
+        reasons.append(f"the torque falls by {100 * fall:.0f} % within a second {where}: it was cut")
+    return Seen(tuple(reasons), tuple(notes), a_x, largest)
+
+
+def longest_gap(x: FloatArray, within: BoolArray) -> int:
+    """Return the largest number of samples in a row that are missing within a stretch."""
+    missing = np.concatenate([[False], ~np.isfinite(x) & within, [False]]).astype(np.int8)
+    edges = np.diff(missing)
+    lengths = np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
+    return int(lengths.max(initial=0))
+
+
+def torque_fall(torque: FloatArray, within: BoolArray, samples: int) -> float:
+    """Return the largest share by which a torque (n,) [N·m] lies below its highest of so many samples before.
+
+    Only samples of the stretch count, on both sides. NaN without a torque above 0.
+    """
+    x = torque[within]
+    x = x[np.isfinite(x)]
+    if not (x > 0.0).any():
+        return math.nan
+    width = min(samples, x.size)
+    padded = np.concatenate([np.full(width - 1, -np.inf), x])
+    highest = np.lib.stride_tricks.sliding_window_view(padded, width).max(axis=1)
+    return float(np.max(1.0 - x[highest > 0.0] / highest[highest > 0.0]))
+
+
+def _acceleration(signals: Signals, v: FloatArray, inside: BoolArray) -> tuple[float, str]:
+    """Return the mean acceleration of a stretch [m/s²], and a note where it is that of the speed."""
+    t = signals.array("t")
+    a_x = signals.array("a_x")[inside]
+    if a_x.size and np.isfinite(a_x).mean() >= 0.5:
+        return float(np.nanmean(a_x)), ""
+    good = inside & np.isfinite(v)
+    if good.sum() < 3:
+        return math.nan, ""
+    away = t[good] - t[good].mean()
+    return float(away @ v[good] / (away @ away)), "no a_x: the acceleration is that of the speed"
+
+
+def _shift(signals: Signals, t: FloatArray, t_stop: float, seconds: float) -> bool | None:
+    """Return whether the gear changes about a time; None without a gear."""
+    gear = signals.array("gear")
+    near = gear[(np.abs(t - t_stop) <= seconds) & np.isfinite(gear)]
+    return None if not near.size else bool(np.ptp(near) > 0.0)

@@ -1,0 +1,86 @@
+"""The sentences of a validation, from records by hand."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aqualog.report.text import report_text
+from aqualog.report.validation import validation_document, validation_report
+from aqualog.validate.boundary import Tolerance
+from aqualog.validate.records import Judged, Limit, Plan, Plot, Rated, Trace, Validity, Worst
+
+PLOT = Plot("a_x", "t", Tolerance(0.1, 0.0, 0.15, 0.05))
+WORST = Worst("d.mf4", "a_x", -0.12, 4.1, 6.3)
+ZERO = np.zeros(100)
+TRACE = Trace(
+    "d.mf4", 0.1, 10.0, {"a_x": ZERO}, {"a_x": ZERO}, {"t": 0.1 * np.arange(100), "v_x": ZERO + 20.0},
+    np.ones(100, bool), np.zeros(100, bool),
+)  # fmt: skip
+FOUND = Validity(
+    (TRACE,), Plan(), 0.97, 10.0, 10.0, (Judged(PLOT, 100, 97, 10.0, WORST),), WORST,
+    (
+        Limit("dry", math.nan, 10.0, 36.0, 0.99, 200.0),
+        Limit("on water", 92.0 / 3.6, 50.0 / 3.6, 120.0 / 3.6, 0.4, 30.0),
+    ),
+    (Rated("a_x", 10.0, 0.83, 0.9, 1.0, 0.7, 0.65, 0.02), Rated("slip_fr", 10.0, 0.6, 0.7, 0.9, 0.4, 0.3, 0.0)), {},
+)  # fmt: skip
+
+
+def document(found=FOUND, method="boundary", why=None):
+    return validation_document(found, method=method, vehicle="the i30", logs=["d.mf4"], notes=[], why=why)
+
+
+def test_the_sentence_of_the_boundaries():
+    assert document()["sentence"] == (
+        "By the method of ISO 19364, on another test: the simulation of the i30 is within the boundaries 97 % of the time, "
+        "worst a_x by 0.12 m/s² at 4.1-6.3 s; not valid above 92 km/h on water."
+    )
+
+
+def test_the_sentence_of_the_rating():
+    assert document(method="18571")["sentence"] == (
+        "By the method of ISO/TS 18571, on another test: the simulation of the i30 is rated 0.71 over 2 signals, lowest "
+        "slip_fr with 0.60; not valid above 92 km/h on water."
+    )
+    assert "has no rating, because no signal moved enough" in document(replace(FOUND, rated=()), "18571")["sentence"]
+
+
+def test_of_several_drives_the_worst_is_named():
+    two = replace(FOUND, traces=(TRACE, replace(TRACE, name="e.mf4")))
+    assert "at 4.1-6.3 s of d.mf4;" in document(two)["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("limit", "told"),
+    [
+        (Limit("on water", 50.5 / 3.6, 50.0 / 3.6, 120.0 / 3.6, 0.4, 30.0), "not valid on water (50 to 120 km/h)."),
+        (Limit("dry", 100.0 / 3.6, 50.0 / 3.6, 120.0 / 3.6, 0.4, 30.0), "not valid above 100 km/h on dry road."),
+        (Limit("dry", math.nan, 50.0 / 3.6, 120.0 / 3.6, 1.0, 30.0), "valid at all speeds driven."),
+    ],
+)
+def test_limits_in_words(limit, told):
+    assert document(replace(FOUND, limits=(limit,)))["sentence"].endswith(told)
+
+
+def test_a_rating_is_never_a_cause():
+    why = {
+        "verdict": "named", "sentence": "The car weighed 262 kg more.", "caution": "", "next_manoeuvre": None,
+        "causes": [{"effect": "payload_mass", "where": None, "key": "payload_mass", "sentence": "The car weighed 262 kg more.",
+                    "probability": 0.99}],
+    }  # fmt: skip
+    d = document(why=why)
+    text = report_text(validation_report(FOUND, d))
+    head, _, rest = text.partition("why: the verdict of diagnose")
+    assert "97 %" in head
+    first = rest.split("where it is valid")[0]
+    assert first.count("The car weighed 262 kg more.") == 1
+    assert "rating" not in first.lower()
+    assert "A rating stands beside the boundaries." in rest
+    assert "none of a standard's" in rest
+    assert d["diagnosis"]["causes"][0]["key"] == "payload_mass"
+    order = [text.index(x) for x in ("boundaries by the method", "ratings by the method")]
+    assert order == sorted(order)
+    other = report_text(validation_report(FOUND, document(method="18571")))
+    assert other.index("ratings by the method") < other.index("boundaries by the method")

@@ -1,0 +1,258 @@
+"""A whole test: order, sets, control tyre, JSON of the contract, text and page."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from aqualog.book.topics import DOCS
+from aqualog.campaign.definition import Campaign, Run
+from aqualog.core.errors import ConfigError
+from aqualog.report.page import report_page
+from aqualog.report.text import report_text
+from aqualog.report.trade.document import trade_document
+from aqualog.report.trade.figures import trade_figures
+from aqualog.report.trade.sections import headline, trade_report
+from aqualog.trade.braking import Stop
+from aqualog.trade.curve import CurvePass
+from aqualog.trade.entry import Entry
+from aqualog.trade.evaluation import Options, check_control, entries_of, evaluated
+from aqualog.trade.grip import Coefficients
+from aqualog.trade.limits import Limits, defaults, described
+from aqualog.trade.logs import Measured
+from aqualog.trade.onset import Onset
+from aqualog.trade.straight import StraightRun
+
+KMH = 1.0 / 3.6
+
+
+def run(v, *, a_x=1.3, above=False, reasons=()):
+    speeds = {"v_05": (v - 5) * KMH, "v_10": (v - 2) * KMH, "v_15": math.nan if above else v * KMH, "v_50": math.nan}
+    bound = v * KMH if above else math.nan
+    return StraightRun(speeds, {}, "v_x", "", bound, tuple(reasons), ("no gear",), a_x, 0.01, 1.0, 6.0, "left", "f")
+
+
+def entries(*sets, keys=("tyre",)):
+    found = []
+    for tyre, records in sets:
+        for record in records:
+            order = float(len(found))
+            found.append(Entry(f"{int(order)}.mf4", 1, order, tuple((k, tyre) for k in keys), tyre, record))
+    return tuple(found)
+
+
+def straight(*sets, control="", limits=None):
+    return evaluated(entries(*sets), Options("straight", limits or defaults(), ("tyre",), control))
+
+
+def test_set_mean_and_index_with_a_drifting_control():
+    # the control falls by 1 km/h from set to set; A runs between them and equals it, B is 8 km/h better
+    c = [("C", [run(80.2), run(79.8)]), ("C", [run(79.2), run(78.8)]), ("C", [run(78.2), run(77.8)])]
+    test = straight(c[0], ("A", [run(79.7), run(79.3)]), c[1], ("B", [run(86.7), run(86.3)]), c[2], control="C")
+    rows = {dict(s.group)["tyre"]: s for s in test.sets}
+    assert [b.estimate.value for b in test.controls[0].control.blocks] == pytest.approx([80.0, 79.0, 78.0])
+    assert rows["A"].index.value == pytest.approx(100.0)
+    assert rows["A"].index.sentence.startswith("not different from C")
+    assert rows["B"].index.value == pytest.approx(100.0 * 86.5 / 78.5)
+    assert "points above C" in rows["B"].index.sentence
+    assert rows["C"].index is None
+    assert rows["C"].summary.mean == pytest.approx(79.0)
+    drift = test.controls[0].drift
+    assert drift.change == pytest.approx(78.0 / 80.0 - 1.0)
+    # spread of a control run: 0.2828 in each set, three degrees of freedom; each set of two
+    assert test.controls[0].control.blocks[0].estimate.variance == pytest.approx(0.08 / 2)
+
+
+def test_a_run_with_another_acceleration_does_not_count():
+    test = straight(("A", [run(78.0), run(78.4), run(78.2, a_x=1.31), run(90.0, a_x=1.6)]))
+    assert test.valid == 3
+    assert "the acceleration before 15 % is 1.60 m/s², more than 10 %" in test.entries[3].reasons[0]
+    assert test.sets[0].summary.mean == pytest.approx(78.2)
+    wide = straight(
+        ("A", [run(78.0), run(78.4), run(78.2), run(90.0, a_x=1.6)]), limits=Limits.of({"straight.a_x_share": 0.5})
+    )
+    assert wide.valid == 4
+
+
+def test_runs_beyond_the_lane_count_as_above():
+    test = straight(("A", [run(78.0), run(79.0), run(80.0), run(81.0, above=True)]), ("B", [run(90.0, above=True)] * 3))
+    a, b = (s.summary for s in test.sets)
+    assert a.censored == 1
+    assert a.mean > 79.25  # more than the mean with 81 as a value would say
+    assert math.isnan(b.mean)
+    assert b.above == pytest.approx(90.0)
+
+
+@pytest.mark.parametrize(
+    "records", [[], [run(78.0)], [run(78.0, reasons=("no lane",))] * 2, [run(85.0, above=True)] * 2]
+)
+def test_odd_sets_make_a_document_a_text_and_a_page(records):
+    test = straight(("C", [run(80.0), run(80.4)]), ("A", records), ("C", [run(80.1), run(80.2)]), control="C")
+    document = trade_document(test, "made")
+    json.dumps(document, allow_nan=False)
+    report = trade_report(test)
+    assert report_text(report).startswith("straight aquaplaning:")
+    assert "<html" in report_page(report, title="made", plotly="none")
+
+
+def test_no_valid_run_of_the_control():
+    test = straight(("C", [run(80.0, reasons=("no lane",))]), ("A", [run(80.0), run(81.0), run(80.2)]), control="C")
+    assert test.controls == ()
+    assert test.sets[1].index is None
+    assert "no valid run of the control C: no index" in test.notes
+
+
+def test_one_control_set_is_held_constant():
+    test = straight(("C", [run(80.0), run(80.4)]), ("A", [run(80.0), run(81.0), run(80.2)]), control="C")
+    assert "its drift is not known" in test.notes[0]
+    assert test.sets[1].index.value == pytest.approx(100.0 * 80.4 / 80.2)
+
+
+def test_control_of_the_same_configuration_if_it_has_one():
+    def entry(tyre, pressure, v, order):
+        group = (("tyre", tyre), ("pressure_rear_bar", pressure))
+        return Entry(f"{order}.mf4", 1, float(order), group, tyre, run(v))
+
+    given = [("C", 2.0, 70.0), ("C", 2.0, 70.2), ("C", 2.5, 80.0), ("C", 2.5, 80.2), ("A", 2.0, 77.0), ("A", 2.0, 77.2),
+             ("A", 3.0, 77.0), ("A", 3.0, 77.2)]  # fmt: skip
+    test = evaluated(
+        [entry(*g, i) for i, g in enumerate(given)],
+        Options("straight", defaults(), ("tyre", "pressure_rear_bar"), "C"),
+    )
+    own, strange = (s for s in test.sets if s.index is not None)
+    assert own.index.control == pytest.approx(70.1)
+    assert "another configuration" in strange.index_note
+
+
+def test_document_of_the_contract():
+    test = straight(("C", [run(80.0), run(80.4)]), ("A", [run(88.0), run(88.4), run(70.0, reasons=("shift",))]),
+                    ("C", [run(80.2), run(80.1)]), control="C")  # fmt: skip
+    d = trade_document(test, "made")
+    r = d["runs"][4]
+    assert {k: r[k] for k in ("log", "v_15_kmh", "censored", "valid", "reason")} == {
+        "log": "4.mf4", "v_15_kmh": 70.0, "censored": False, "valid": False, "reason": "shift",
+    }  # fmt: skip
+    assert d["runs"][0]["reason"] is None
+    s = next(s for s in d["sets"] if s["tyre"] == "A")
+    assert s["runs"] == 3
+    assert s["valid"] == 2
+    assert s["mean_kmh"] == pytest.approx(88.2)
+    assert s["ci95"][0] < 88.2 < s["ci95"][1]
+    assert s["cv"] == pytest.approx(0.28284 / 88.2, rel=1e-3)
+    assert s["index"] == pytest.approx(100 * 88.2 / 80.175, rel=1e-3)
+    assert s["index_ci95"][0] < s["index"] < s["index_ci95"][1]
+    assert {x["key"] for x in d["limits"]} == {x.path for x in described() if x.table in ("straight", "set")}
+    assert next(x for x in d["limits"] if x["key"] == "straight.slip")["default"] == 0.15
+
+
+def test_onset_stands_beside_the_set():
+    made = [replace(e, onset=Onset({"minor_spin_down": 70.0 * KMH}, {"slip_slope_drop": "torque_fl"}))
+            for e in entries(("A", [run(80.0), run(80.4)]))]  # fmt: skip
+    d = trade_document(evaluated(made, Options("straight", defaults(), ("tyre",))), "made")
+    assert d["sets"][0]["v_minor_spin_down_kmh"] == pytest.approx(70.0)
+    assert d["sets"][0]["v_slip_slope_drop_kmh"] is None
+    assert d["sets"][0]["v_05_kmh"] == pytest.approx(75.2)
+    assert d["runs"][0]["onset_missing"] == {"slip_slope_drop": "torque_fl"}
+
+
+def test_braking_needs_six_stops_and_gives_the_wet_grip_index():
+    def stop(bfc, t=20.0):
+        return Stop(22.2, 5.6, 33.0, bfc, bfc, t, 1e-3, 0.7e-3, 3.0, 5.4)
+
+    coefficients = Coefficients("made", 125.0, -0.4, 20.0, -8.0, 0.70)
+    options = Options("braking", defaults(), ("tyre",), "C", coefficients=coefficients)
+    test = evaluated(
+        entries(("C", [stop(0.70)] * 3), ("A", [stop(0.77, 25.0), stop(0.77, 25.0)]), ("C", [stop(0.70)] * 3)), options
+    )
+    control, a = test.sets
+    assert control.summary.notes == ("all values are equal: the interval has no width",)
+    assert "2 valid runs of 2, at least 6 needed" in a.summary.notes
+    assert a.index.value == pytest.approx(110.0)
+    assert a.grip_index == pytest.approx((137.5 - 2.0) / 100.0)
+    assert trade_document(test, "x")["sets"][1]["wet_grip_index"] == pytest.approx(1.355)
+    wide = evaluated(entries(("A", [stop(x) for x in (0.6, 0.8, 0.7, 0.65, 0.75, 0.7)])), options)
+    assert "coefficient of variation is 10.1 %, at most 4 %" in " ".join(wide.sets[0].summary.notes)
+    cold = evaluated(entries(("C", [stop(0.7)] * 2), ("A", [stop(0.7, math.nan)] * 2)), options)
+    assert "no temperature of each stop" in cold.sets[1].index_note
+
+
+def test_curve_document_and_index():
+    def passes(shift):
+        return [
+            CurvePass(v * KMH, (v * KMH) ** 2 / 100, 4 - 0.2 * (v - 60) + shift + k, 5 - 0.2 * (v - 60) + shift + k, 100.0)
+            for v in (60, 65, 70, 75) for k in (-0.1, 0.0, 0.1)
+        ]  # fmt: skip
+
+    options = Options("curve", defaults(), ("tyre",), "C")
+    test = evaluated(entries(("C", passes(0.0)), ("A", passes(0.5)), ("C", passes(0.2))), options)
+    a = next(s for s in test.sets if not s.is_control)
+    assert a.curve.result == pytest.approx(4.0)  # 5 ... 2, and 0.5
+    assert a.index.control == pytest.approx(3.6)
+    assert a.index.value == pytest.approx(100.0 * 4.0 / 3.6)
+    d = trade_document(test, "made")
+    assert d["common_kmh"] == pytest.approx([60.0, 75.0])
+    assert set(d["sets"][1]) >= {"value", "ci95", "index", "index_ci95", "v_half_kmh", "v_zero_kmh", "v_greatest_kmh"}
+    assert "4.00" in report_text(trade_report(test))
+    json.dumps(d, allow_nan=False)
+
+
+@pytest.mark.parametrize("kind", ["straight", "curve", "braking"])
+def test_documents_are_as_their_schemas_say(kind):
+    jsonschema = pytest.importorskip("jsonschema")
+    stop = Stop(22.2, 5.6, 33.0, 0.7, math.nan, math.nan, 1e-3, math.nan, 3.0, 5.4)
+    record = {"straight": run(80.0), "curve": CurvePass(20.0, 4.0, 2.0, 3.0, 100.0), "braking": stop}[kind]
+    bad = {
+        "straight": StraightRun(reasons=("no",)),
+        "curve": CurvePass(reasons=("no",)),
+        "braking": Stop(reasons=("no",)),
+    }
+    found = entries(("C", [record, record]), ("A", [record, bad[kind]]), ("B", [bad[kind]]), ("C", [record]))
+    test = evaluated(found, Options(kind, defaults(), ("tyre",), "C"), {"gone.mf4": "no such file"})
+    stored = json.loads((DOCS / "schemas" / f"test_{kind}.schema.json").read_text(encoding="utf-8"))
+    document = json.loads(json.dumps(trade_document(test, "made"), allow_nan=False))
+    assert [e.message for e in jsonschema.Draft202012Validator(stored).iter_errors(document)] == []
+    assert "<html" in report_page(trade_report(test), title="made", plotly="none")
+
+
+def test_names_that_a_page_could_run_are_text():
+    name = "<b>A</b>&%{x}"
+    test = straight(("C", [run(80.0), run(80.4)]), (name, [run(80.0), run(81.0)]), ("C", [run(80.1)]), control="C")
+    figures = json.dumps(trade_figures(test), ensure_ascii=False)
+    assert "<b>" not in figures
+    assert "‹b›A" in figures
+    assert "<b>A" not in report_page(trade_report(test), title="made", plotly="none")
+
+
+def campaign(*tyres):
+    runs = tuple(Run((Path(f"{i}.mf4"),), Path("car.toml"), None, None, {"tyre": t}) for i, t in enumerate(tyres))
+    return Campaign("made", Path("campaign.toml"), None, runs)
+
+
+def test_order_of_the_runs():
+    c = campaign("A", "B", "A")
+    at = [Measured((run(80.0),), (), t) for t in (300, 100, 200)]
+    names = ["0", "1", "2"]
+    assert [e.log for e in entries_of(c, names, dict(enumerate(at)), ("tyre",))] == ["1", "2", "0"]
+    same = [m._replace(start_ns=5) for m in at]  # a clock that is not set: as in the campaign
+    assert [e.log for e in entries_of(c, names, dict(enumerate(same)), ("tyre",))] == ["0", "1", "2"]
+    two = [m._replace(start_ns=t) for m, t in zip(at, (300, 5, 5), strict=True)]
+    assert [e.log for e in entries_of(c, names, dict(enumerate(two)), ("tyre",))] == ["0", "1", "2"]
+    late = replace(run(80.0), lane=(40.0, 50.0))  # a log of a whole session: its runs follow each other
+    session = [m._replace(start_ns=7_000_000_000, found=(f,)) for m, f in
+               zip(at, (late, run(80.0), replace(late, lane=(20.0, 30.0))), strict=True)]  # fmt: skip
+    assert [e.log for e in entries_of(c, names, dict(enumerate(session)), ("tyre",))] == ["1", "2", "0"]
+    broken = {0: at[0], 1: "cannot be read", 2: at[2]}
+    assert [e.log for e in entries_of(c, names, broken, ("tyre",))] == ["2", "0"]
+
+
+def test_a_control_that_nobody_drove():
+    with pytest.raises(ConfigError, match="no run has the control tyre"):
+        check_control(campaign("A", "B"), "SRTT")
+    check_control(campaign("A", "B"), "")
+
+
+def test_headline_without_a_run_of_this_kind():
+    test = straight(("A", [StraightRun(reasons=("no watered lane in the log",))]))
+    assert headline(test) == "straight aquaplaning: 0 of 1 run valid: there is no run of this kind"

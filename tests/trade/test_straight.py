@@ -1,0 +1,174 @@
+"""The straight test of one run, by hand-made wheel speeds."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aqualog.trade.limits import Limits, defaults
+from aqualog.trade.straight import crossing, slip_of, straight_runs
+from tests.trade.made import FWD, KMH, RWD, signals, straight
+
+
+def one(columns, car=FWD, **more):
+    (run,) = straight_runs(signals(columns), car, **more)
+    return run
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize(("car", "axle"), [(FWD, "f"), (RWD, "r")])
+def test_speed_of_15_percent(side, car, axle):
+    run = one(straight(side=side, axle=axle, v_15=78.0), car)
+    assert run.valid, run.reasons
+    assert run.wet_side == side
+    assert run.axle == axle
+    # a slope of 1 % per km/h: 5 % ten km/h below, 10 % five, 50 % 35 above
+    speeds = {n: v / KMH for n, v in run.speeds.items()}
+    assert speeds["v_15"] == pytest.approx(78.0, abs=0.01)
+    assert speeds["v_10"] == pytest.approx(73.0, abs=0.01)
+    assert speeds["v_05"] == pytest.approx(68.0, abs=0.01)
+    assert speeds["v_50"] == pytest.approx(113.0, abs=0.01)
+    assert run.speeds_other["v_15"] == pytest.approx(78.0 * KMH, abs=0.003)
+    assert (run.reference, run.other) == ("v_x", f"omega_{'r' if axle == 'f' else 'f'}{'r' if side == 'left' else 'l'}")
+
+
+def test_radii_that_differ_are_taken_out_in_the_dry_second():
+    run = one(straight(ratio=1.02))
+    assert run.ratio == pytest.approx(1 / 1.02)
+    assert run.v / KMH == pytest.approx(78.0, abs=0.01)
+
+
+def test_slip_by_hand():
+    omega_wet, omega_dry = np.array([50.0, 50.0, 57.5]), np.array([49.0, 49.0, 49.0])
+    before = np.array([True, True, False])
+    s, q = slip_of(omega_wet, omega_dry, np.zeros(3), before)
+    assert q == pytest.approx(0.98)
+    assert s == pytest.approx([0.0, 0.0, 0.15])
+    s, q = slip_of(omega_wet, omega_dry, np.array([0.01, 0.01, 0.03]), before)
+    assert q == pytest.approx(1.01 / (50 / 49))
+    assert s[2] == pytest.approx(57.5 / 49 * q - 1 - 0.03)
+
+
+def test_crossing_by_hand():
+    on = np.ones(8, dtype=bool)
+    slip = np.array([0.0, 0.1, 0.2, 0.1, 0.1, 0.2, 0.2, 0.2])
+    assert crossing(slip, on, 0.15, 1) == pytest.approx(1.5)
+    assert crossing(slip, on, 0.15, 3) == pytest.approx(4.5)  # the first one does not last
+    assert math.isnan(crossing(slip, on, 0.15, 4))
+    assert math.isnan(crossing(slip, on & (np.arange(8) < 2), 0.15, 1))
+
+
+def test_a_run_that_ends_before_15_percent_is_censored_and_counts():
+    run = one(straight(v_15=200.0))
+    assert run.is_censored
+    assert run.valid
+    assert run.v / KMH == pytest.approx((50 * KMH + 1.3 * 14.0) / KMH, abs=0.1)
+
+
+def test_yaw_of_a_bent_line_is_taken_off():
+    columns = straight()
+    t = np.arange(columns["v_x"].size) / 100.0
+    columns["yaw_rate"] = np.where(t > 2.0, 0.03, 0.0)
+    for w, sign in (("l", -1.0), ("r", 1.0)):  # left turn: the right wheels run outside
+        for axle in "fr":
+            columns[f"omega_{axle}{w}"] = (
+                columns[f"omega_{axle}{w}"] + sign * 0.5 * columns["yaw_rate"] * FWD.track / 0.317
+            )
+    run = one(columns)
+    assert run.v / KMH == pytest.approx(78.0, abs=0.1)
+    assert run.speeds_other["v_15"] / KMH == pytest.approx(78.0, abs=0.1)
+
+
+def broken(name, value, when=slice(None)):
+    columns = straight()
+    x = columns[name].copy()
+    x[when] = value
+    return {**columns, name: x}
+
+
+AT = slice(760, 790)  # 15 % are reached at 5.98 s
+REASONS = {
+    "yaw": (lambda: broken("yaw_rate", 0.2, slice(500, 560)), "yaw rate reaches 0.200"),
+    "shift": (lambda: broken("gear", 4.0, slice(600, None)), "gear changes within 0.3 s"),
+    "cut": (lambda: broken("torque_fl", 0.0, slice(540, 580)), "torque falls by 50 %"),
+    "gap": (lambda: broken("omega_fl", np.nan, slice(540, 580)), "wheel speeds are missing for 0.40 s"),
+    "idle": (lambda: broken("a_x", 0.05), "0.05 m/s²: no full throttle"),
+    "fast": (lambda: straight(v_15=64.5, slope=0.5), "after the lane began"),
+    "no dry road": (lambda: straight(lane=(0.3, 14.0)), "of dry road"),
+    "one wheel": (lambda: {k: x for k, x in straight().items() if k != "omega_fr"}, "omega_fr is not in the log"),
+    "slow log": (lambda: {k: x[::20] for k, x in straight().items()}, "at least 10 needed"),
+    "no lane": (lambda: {k: x for k, x in straight().items() if "water" not in k}, "no watered lane"),
+    "no dry wheel": (
+        lambda: straight() | {"water_depth_right": np.full(1500, 7e-3), "water_depth_left": np.full(1500, 7e-3)},
+        "no side is dry beside a wet one: 7.0 and 7.0 mm",
+    ),
+    "side unknown": (
+        lambda: {k: x for k, x in straight(v_15=300.0).items() if not k.startswith("water")},
+        "the wet side is not known",
+    ),
+    "no speed": (lambda: {k: x for k, x in straight().items() if k not in ("v_x", "omega_rr")}, "no speed on the lane"),
+}
+
+
+@pytest.mark.parametrize("name", REASONS)
+def test_a_run_that_is_none_says_why(name):
+    make, words = REASONS[name]
+    (run,) = straight_runs(signals(make(), rate=5.0 if name == "slow log" else 100.0), FWD)
+    assert not run.valid
+    assert words in "; ".join(run.reasons)
+
+
+def test_what_is_not_in_the_log_is_a_note():
+    bare = {k: x for k, x in straight().items() if k.startswith(("omega", "on_water", "water"))}
+    run = one(bare)
+    assert run.valid
+    assert run.v / KMH == pytest.approx(78.0, abs=0.05)
+    said = "; ".join(run.notes)
+    for words in ("no v_x", "no gear", "no torque", "no yaw_rate", "no a_x"):
+        assert words in said
+
+
+def test_the_wet_side_is_found_by_the_wheels_where_no_depth_is_known():
+    run = one({k: x for k, x in straight(side="right").items() if not k.startswith("water")})
+    assert run.wet_side == "right"
+    assert "turns faster" in run.notes[0]
+
+
+def test_radius_of_the_free_wheel_that_the_vehicle_file_does_not_have():
+    car = replace(FWD, given=frozenset({"drivetrain"}), r_e_r=0.4)
+    columns = straight()
+    run = one(columns, car)
+    assert run.speeds_other["v_15"] / KMH == pytest.approx(78.0, abs=0.01)  # learnt: 0.317 m
+    assert "is learnt from v_x before the lane" in " ".join(run.notes)
+    columns["v_x"] = np.where(np.arange(1500) < 300, columns["v_x"], np.nan)  # lost on the lane
+    run = one(columns, car)
+    assert run.reference == "omega_rr"
+    assert run.v / KMH == pytest.approx(78.0, abs=0.01)
+    del columns["v_x"]
+    run = one(columns, car)
+    assert not run.valid
+    assert "the vehicle file has no wheels.r_e_r" in run.reasons[0]
+
+
+def test_no_drivetrain():
+    from aqualog.core.vehicle import Vehicle
+
+    (run,) = straight_runs(signals(straight()), Vehicle())
+    assert "which axle is driven" in run.reasons[0]
+
+
+def test_lane_of_the_campaign_and_several_passages():
+    columns = straight()
+    del columns["on_water"], columns["water_depth_left"], columns["water_depth_right"]
+    run = one(columns, lane=(3.0, 14.0), depths=(7e-3, 0.0))
+    assert run.v / KMH == pytest.approx(78.0, abs=0.01)
+    twice = {k: np.concatenate([x, x]) for k, x in straight().items()}
+    assert [round(r.v / KMH, 1) for r in straight_runs(signals(twice), FWD)] == [78.0, 78.0]
+
+
+def test_limits_of_a_user():
+    limits = Limits.of({"straight.slip": 0.10}).straight
+    run = one(straight(), limits=limits)
+    assert run.v / KMH == pytest.approx(73.0, abs=0.01)
+    assert defaults().straight.slip == 0.15
