@@ -24,6 +24,7 @@ from aqualog.diagnose.spline import POINTS, Basis
 __all__ = ["with_elements"]
 
 EDGES = 75  # of intervals, evenly over the drive
+OUTLIER = 6.0  # of the median size (4 standard deviations), beyond which a sample counts no more
 SHORTEST = 3  # edges from the begin of an interval to its end
 # waves: from half a period over the drive to ... periods, in steps of ...
 PERIODS, STEP = 150.0, 0.5
@@ -50,6 +51,9 @@ def with_elements(arena: Arena) -> Arena:
     deviations = arena.tolerance @ arena.tolerant(arena.white())[:-1, -1]
     white = white_noise(part.residual, used, contrasts(part.channels)).rotation
     left = white @ (part.residual - arena.made(0, deviations))
+    # a kerb or a shift of a second is no form
+    most = OUTLIER * np.median(np.abs(left[:, used]), axis=1, keepdims=True)
+    left = np.clip(left, -most, most)
     drive = arena.evidence.drives[part.drive]
     along = {n: drive.coordinates[n][part.at] for n in ("t", "position") if n in drive.coordinates}
     made = []
@@ -102,11 +106,12 @@ def _interval(t: FloatArray, weight: FloatArray, score: FloatArray) -> _Found | 
     inside = (low > 0, high < t.size)
     gain = 0.0
     step = int(at[1])
+    shortest = SHORTEST * step
     while step >= 1:
         moves = [(d * inside[0], e * inside[1], r) for d in (-step, 0, step) for e in (-step, 0, step)
                  for r in (-step, 0, step)]  # fmt: skip
         tried = [(low + d, high + e, max(rise + r, 0)) for d, e, r in moves]
-        each = [_gain(_trapezoid(t.size, *x), weight, score) if x[1] - x[0] > step else 0.0 for x in tried]
+        each = [_gain(_trapezoid(t.size, *x), weight, score) if x[1] - x[0] >= shortest else 0.0 for x in tried]
         k = int(np.argmax(each))
         if each[k] <= gain * (1.0 + 1e-9):
             step //= 2

@@ -46,6 +46,12 @@ def test_slow_noise_is_no_form(seed):
     assert forms == ()
 
 
+def test_a_kerb_is_no_form():
+    _, p, forms = found(19, lambda c: 2500.0 * (np.abs(c["t"] - 180.0) < 0.6))
+    assert p.best == ()
+    assert forms == ()
+
+
 def test_a_known_effect_beside_an_interval():
     _, p, forms = found(17, lambda c: 200.0 * trapezoid(c["t"], 60.0, 120.0, 0.1), aero_drag=0.5)
     assert [r.depends_on for r in forms] == [("t",)]
