@@ -149,7 +149,7 @@ def test_document_of_the_contract():
 
 def test_onset_stands_beside_the_set():
     made = [replace(e, onset=Onset({"minor_spin_down": 70.0 * KMH}, {"slip_slope_drop": "torque_fl"}))
-            for e in entries(("A", [run(80.0), run(80.4)]))]  # fmt: skip
+            for e in entries(("A", [run(80.0), run(80.4), replace(run(80.2), speeds={"v_15": 80.2 * KMH})]))]  # fmt: skip
     d = trade_document(evaluated(made, Options("straight", defaults(), ("tyre",))), "made")
     assert d["sets"][0]["v_minor_spin_down_kmh"] == pytest.approx(70.0)
     assert d["sets"][0]["v_slip_slope_drop_kmh"] is None
