@@ -95,6 +95,9 @@ def test_summary():
     assert (found.runs, found.valid, found.censored, found.dof) == (5, 3, 0, 2)
     assert found.cv == pytest.approx(2.0 / 78.0)
     assert found.notes == ()
+    assert found.is_enough
+    assert not summarised([76.0, 78.0], [], 5, LIMITS).is_enough
+    assert not summarised([68.0, 78.0, 88.0], [], 3, LIMITS).is_enough
     assert "coefficient of variation is 12.8 %" in summarised([68.0, 78.0, 88.0], [], 3, LIMITS).notes[0]
 
 
