@@ -114,8 +114,8 @@ def entries_of(
 ) -> tuple[Entry, ...]:
     """Return all runs, passes or stops in the order in which they were driven.
 
-    That is by their absolute times, else by the campaign's order: where a log has no time, or two logs have the same, as
-    those of a logger whose clock is not set.
+    That is by their absolute times, else by the campaign's order: where a log has no time, or two logs have the same,
+    as those of a logger whose clock is not set.
     """
     found = [
         (i, number, record, m)
