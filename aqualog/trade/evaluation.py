@@ -114,7 +114,8 @@ def entries_of(
 ) -> tuple[Entry, ...]:
     """Return all runs, passes or stops in the order in which they were driven.
 
-    That is by their absolute times where all have different ones, else by the campaign's order.
+    That is by their absolute times, else by the campaign's order: where a log has no time, or two logs have the same,
+    as those of a logger whose clock is not set.
     """
     found = [
         (i, number, record, m)
@@ -122,7 +123,8 @@ def entries_of(
         for number, record in enumerate(m.found, 1)
     ]  # fmt: skip
     times = [m.start_ns * 1e-9 + _begin(record) for _, _, record, m in found if m.start_ns is not None]
-    if len(times) == len(set(times)) == len(found):
+    starts = {campaign.runs[i].logs: m.start_ns for i, _, _, m in found}
+    if len(times) == len(set(times)) == len(found) and len(set(starts.values())) == len(starts):
         found = [found[k] for k in sorted(range(len(found)), key=lambda k: times[k])]
     entries = []
     for order, (i, number, record, m) in enumerate(found):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ class Summary:
 
     `runs` in all, `valid` of them, `censored` of these. `above`: where all valid runs are censored, the lowest of their
     bounds, which the mean lies above as far as one can say; else NaN. `notes`: what is to be said of the set.
+    `is_enough`: there are enough valid runs, and they scatter little enough.
     """
 
     runs: int
@@ -33,6 +34,7 @@ class Summary:
     sd: float = math.nan
     above: float = math.nan
     notes: tuple[str, ...] = ()
+    is_enough: bool = False
 
     @property
     def cv(self) -> float:
@@ -71,11 +73,13 @@ def summarised(values: Sequence[float], bounds: Sequence[float], runs: int, limi
         notes.append(f"{len(bounds)} of {valid} runs did not reach their value and count as above it")
     if found.sd == 0.0:
         notes.append("all values are equal: the interval has no width")
-    summary = Summary(runs, valid, len(bounds), found.mean, found.ci, found.sd, notes=tuple(notes))
+    summary = Summary(runs, valid, len(bounds), found.mean, found.ci, found.sd)
     if summary.cv > limits.cv:
-        more = f"the coefficient of variation is {100 * summary.cv:.1f} %, at most {100 * limits.cv:g} % expected"
-        return Summary(runs, valid, len(bounds), found.mean, found.ci, found.sd, notes=(*notes, more))
-    return summary
+        notes.append(
+            f"the coefficient of variation is {100 * summary.cv:.1f} %, at most {100 * limits.cv:g} % expected"
+        )
+    is_enough = valid >= limits.runs and summary.cv <= limits.cv
+    return replace(summary, notes=tuple(notes), is_enough=is_enough)
 
 
 def away_from_set(values: Sequence[float], share: float) -> list[bool]:

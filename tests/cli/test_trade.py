@@ -63,7 +63,8 @@ def test_campaign(campaign, tmp_path):
     assert "straight aquaplaning: 11 of 12 runs valid, 2 sets" in done.stdout
     assert "the gear changes within 0.3 s of the crossing" in done.stdout
     assert "points above SRTT: index" in done.stdout
-    assert "straight.slip 0.15" in done.stdout
+    assert "straight.slip 0.15, straight.slip_mean 0.1 s, " in done.stdout
+    assert "straight.entry 0.5 s," in done.stdout
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
         "straight.html", "straight.json", "straight_runs.csv", "straight_sets.csv",
     ]  # fmt: skip

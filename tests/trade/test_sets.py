@@ -75,6 +75,17 @@ def test_two_equal_values_below_a_bound_have_a_finite_mean():
     assert found.ci[0] < found.mean < found.ci[1]
 
 
+def test_a_mean_beyond_all_that_was_seen():
+    x, c = np.array([78.0, 84.0]), np.full(6, 85.0)
+    best = optimize.minimize(
+        lambda p: -stats.norm.logpdf(x, p[0], math.exp(p[1])).sum() - stats.norm.logsf(c, p[0], math.exp(p[1])).sum(),
+        [86.0, 1.0], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12},
+    )  # fmt: skip
+    found = censored_mean(x, c)
+    assert found.mean == pytest.approx(best.x[0], abs=1e-3)
+    assert found.mean > 85.0
+
+
 @pytest.mark.parametrize(("n", "cut"), [(6, 0.5), (5, 1.0)])
 def test_coverage_with_censored_runs(n, cut):
     rng = np.random.default_rng(3)
@@ -95,6 +106,9 @@ def test_summary():
     assert (found.runs, found.valid, found.censored, found.dof) == (5, 3, 0, 2)
     assert found.cv == pytest.approx(2.0 / 78.0)
     assert found.notes == ()
+    assert found.is_enough
+    assert not summarised([76.0, 78.0], [], 5, LIMITS).is_enough
+    assert not summarised([68.0, 78.0, 88.0], [], 3, LIMITS).is_enough
     assert "coefficient of variation is 12.8 %" in summarised([68.0, 78.0, 88.0], [], 3, LIMITS).notes[0]
 
 

@@ -59,6 +59,7 @@ def _summary(stem: str, unit: str, what: str) -> tuple[Field, ...]:
         number(f"sd{stem}", unit, "standard deviation of one run", null=True),
         number("cv", "-", "coefficient of variation", null=True),
         number(f"above{stem}", unit, "lowest bound where no run reached its value; else null", null=True),
+        flag("enough", "whether valid runs and CV are as the thresholds ask"),
     )
 
 

@@ -167,6 +167,7 @@ def _summary(s: Summary, kind: str) -> dict[str, Any]:
         f"sd{stem}": plain(s.sd, 6),
         "cv": plain(s.cv, 6),
         f"above{stem}": plain(s.above, 6),
+        "enough": s.is_enough,
     }
 
 

@@ -34,6 +34,7 @@ _DRAWN = {
 _NOUNS = {"straight": "run", "curve": "pass", "braking": "stop"}
 _MOST_RUNS = 30  # in a terminal; all of them are in page, CSV and JSON
 _WIDTH = 110  # characters of a line of thresholds
+_TIED = "\N{NO-BREAK SPACE}"  # between a key, its value and its unit
 _FOOTER = (
     "Intervals: 95 %. Straight and braking: Student's t; censored runs by likelihood [tobin1958]. Curve: bootstrap "
     "over passes. Index: Fieller [fieller1954], the control tyre linear between its sets by run order. Each interval "
@@ -263,4 +264,5 @@ def _limits_text(test: TradeTest) -> list[str]:
         + (f" (default {r['default']:g})" if r["value"] != r["default"] else "")
         for r in rows
     ]
-    return [*wrap(", ".join(told), _WIDTH, break_long_words=False), "--limits FILE changes them"]
+    lines = wrap(", ".join(t.replace(" ", _TIED) for t in told), _WIDTH, break_long_words=False)
+    return [*(x.replace(_TIED, " ") for x in lines), "--limits FILE changes them"]
