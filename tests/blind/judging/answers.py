@@ -23,6 +23,7 @@ _CHANNELS = {  # a residual channel may show either; an engine that gives the me
 _COORDINATES = {
     "v": "v_x", "speed": "v_x", "velocity": "v_x", "time": "t", "s": "position", "way": "position", "distance": "position",
     "depth": "water_depth", "water": "water_depth", "acceleration": "a_x", "steering": "steer_angle", "traction": "torque",
+    "time since braking": "since_braking",
 }  # fmt: skip
 
 
