@@ -96,14 +96,14 @@ class Arena:
         `only` (K,): columns that are wanted; the others are left zero.
         """
         total = np.zeros((self.width + 1, self.width + 1))
-        known = np.arange(self.evidence.count)
         wanted = np.ones(self.width, dtype=bool) if only is None else only
         used = np.flatnonzero(np.append(wanted, True))
         at = np.cumsum(wanted) - 1
-        known = known[wanted[known]]
+        known = np.flatnonzero(wanted[: self.evidence.count])
         for i, (p, w) in enumerate(zip(self.parts, weighings, strict=True)):
             rows = np.empty((used.size, w.width), dtype=np.float32)
-            rows[at[known]] = w.rows(p.signatures[known] * self.sd[known, None, None])
+            w.rows(p.signatures if only is None else p.signatures[known], rows[: known.size])
+            rows[: known.size] *= self.sd[known, None].astype(np.float32)
             for b in (*self.blocks, *self.forgiven):
                 if b.kind != "effect" and np.any(wanted[list(b.columns)]):
                     rows[at[list(b.columns)]] = w.rows(self.drawn(i, b))

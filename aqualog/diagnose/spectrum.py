@@ -52,12 +52,12 @@ class Weighing:
         row = self.rows(residual[None])[0]
         return self.sharpness + 0.5 * float(row @ row)
 
-    def rows(self, x: FloatArray) -> FloatArray:
-        """Arrays (k, C, n) as rows (k, M)."""
-        out = np.empty((len(x), self.width))
+    def rows(self, x: FloatArray, out: npt.NDArray[np.float32] | None = None) -> FloatArray:
+        """Arrays (k, C, n) as rows (k, M), into `out` if there is one."""
+        rows = np.empty((len(x), self.width)) if out is None else out
         for i in range(0, len(x), CHUNK):
-            out[i : i + CHUNK] = self._rows(np.asarray(x[i : i + CHUNK], dtype=np.float64))
-        return out
+            rows[i : i + CHUNK] = self._rows(np.asarray(x[i : i + CHUNK], dtype=np.float64))
+        return np.asarray(rows)
 
     def _rows(self, x: FloatArray) -> FloatArray:
         flat = whitened(spectra(bridged(x, self.mask)), self.noise).reshape(x.shape)
