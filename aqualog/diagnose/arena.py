@@ -25,7 +25,7 @@ from aqualog.diagnose.spectrum import Weighing, weighing
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
 
-__all__ = ["Arena", "Part", "arena_of", "blocks_of", "known_only", "make_arena", "unit_force"]
+__all__ = ["CHUNK", "Arena", "Part", "arena_of", "blocks_of", "known_only", "make_arena", "products", "unit_force"]
 
 # of an effect at any place, of a shape of a mechanism, and of a road that is not even, on one drive (K)
 KNOWN_PRIOR, SHAPE_PRIOR, ROAD_PRIOR = 0.03, 0.01, 0.2
@@ -102,13 +102,13 @@ class Arena:
         known = np.flatnonzero(wanted[: self.evidence.count])
         for i, (p, w) in enumerate(zip(self.parts, weighings, strict=True)):
             rows = np.empty((used.size, w.width), dtype=np.float32)
-            w.rows(p.signatures if only is None else p.signatures[known], rows[: known.size])
+            rows[: known.size] = w.single(p.signatures if only is None else p.signatures[known])
             rows[: known.size] *= self.sd[known, None].astype(np.float32)
             for b in (*self.blocks, *self.forgiven):
                 if b.kind != "effect" and np.any(wanted[list(b.columns)]):
                     rows[at[list(b.columns)]] = w.rows(self.drawn(i, b))
             rows[-1] = w.rows(p.residual[None])[0]
-            total[np.ix_(used, used)] += _products(rows)
+            total[np.ix_(used, used)] += products(rows)
         return total
 
     def white(self) -> FloatArray:
@@ -128,7 +128,7 @@ class Arena:
                 if b.kind != "effect":
                     rows[list(b.columns)] = white(self.drawn(i, b))
             rows[-1] = white(p.residual[None])[0]
-            total += _products(rows)
+            total += products(rows)
         return total
 
     def tolerant(self, gram: FloatArray) -> FloatArray:
@@ -281,7 +281,7 @@ def _tolerance(evidence: Evidence, made: Sequence[Shape], blocks: Sequence[Block
     return out
 
 
-def _products(rows: npt.NDArray[np.float32]) -> FloatArray:
+def products(rows: npt.NDArray[np.float32]) -> FloatArray:
     """Inner products of single-precision rows, in double precision."""
     total = np.zeros((len(rows), len(rows)))
     for i in range(0, rows.shape[1], CHUNK):

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.arena import Arena, Part
+from aqualog.diagnose.arena import CHUNK, Arena, Part, products
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
 from aqualog.diagnose.spectrum import Weighing
@@ -60,7 +61,7 @@ class Metric:
 
     parts: tuple[Part, ...]
     weighings: tuple[Weighing, ...]
-    A: FloatArray
+    A: NDArray[np.float32]
     M: FloatArray
     apart: FloatArray
     coarse: float = 1.0
@@ -72,7 +73,15 @@ class Metric:
 
     def inner(self, u: FloatArray, w: FloatArray) -> FloatArray:
         """Inner products of rows (a, N) and (b, N): (a, b)."""
-        return np.asarray(u @ w.T - (u @ self.A.T) @ self.M @ (self.A @ w.T))
+        at_u = self.across(u)
+        return np.asarray(u @ w.T - at_u @ self.M @ (at_u if w is u else self.across(w)).T)
+
+    def across(self, u: FloatArray) -> FloatArray:
+        """Inner products of rows (a, N) with those of the tolerances, in double precision. (a, k)"""
+        out = np.zeros((len(u), len(self.A)))
+        for i in range(0, u.shape[1], CHUNK):
+            out += u[:, i : i + CHUNK] @ self.A[:, i : i + CHUNK].T.astype(np.float64)
+        return out
 
 
 def metric(
@@ -106,9 +115,10 @@ def metric(
     for i, (p, w) in enumerate(zip(arena.parts, weighings, strict=True)):
         columns = [p.signatures[k] * sd[k, None, None]]
         columns += [np.tensordot(np.linalg.cholesky(b.prior).T, arena.drawn(i, b), axes=1) for b in arena.forgiven]
-        pieces.append(w.rows(np.concatenate(columns)))
-    A = math.sqrt(coarse) * np.concatenate(pieces, axis=1)
-    M = np.asarray(np.linalg.inv(np.eye(len(A)) + A @ A.T))
+        pieces.append(w.single(np.concatenate(columns)))
+    A = np.concatenate(pieces, axis=1) if len(pieces) > 1 else pieces[0]
+    A *= np.float32(math.sqrt(coarse))
+    M = np.asarray(np.linalg.inv(np.eye(len(A)) + products(A)))
     return Metric(arena.parts, tuple(weighings), A, M, apart, coarse)
 
 

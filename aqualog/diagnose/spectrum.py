@@ -52,12 +52,19 @@ class Weighing:
         row = self.rows(residual[None])[0]
         return self.sharpness + 0.5 * float(row @ row)
 
-    def rows(self, x: FloatArray, out: npt.NDArray[np.float32] | None = None) -> FloatArray:
-        """Arrays (k, C, n) as rows (k, M), into `out` if there is one."""
-        rows = np.empty((len(x), self.width)) if out is None else out
+    def rows(self, x: FloatArray) -> FloatArray:
+        """Arrays (k, C, n) as rows (k, M)."""
+        out = np.empty((len(x), self.width))
         for i in range(0, len(x), CHUNK):
-            rows[i : i + CHUNK] = self._rows(np.asarray(x[i : i + CHUNK], dtype=np.float64))
-        return np.asarray(rows)
+            out[i : i + CHUNK] = self._rows(np.asarray(x[i : i + CHUNK], dtype=np.float64))
+        return out
+
+    def single(self, x: FloatArray) -> npt.NDArray[np.float32]:
+        """The same in single precision, which takes half the memory."""
+        out = np.empty((len(x), self.width), dtype=np.float32)
+        for i in range(0, len(x), CHUNK):
+            out[i : i + CHUNK] = self.rows(x[i : i + CHUNK])
+        return out
 
     def _rows(self, x: FloatArray) -> FloatArray:
         flat = whitened(spectra(bridged(x, self.mask)), self.noise).reshape(x.shape)
