@@ -34,6 +34,7 @@ LEAST_PERIODS = 0.5  # half a wave is a drift
 
 class _Found(NamedTuple):
     kind: str
+    manner: str
     gain: float
     basis: Basis
     tried: float
@@ -81,7 +82,7 @@ def _extended(arena: Arena, made: Sequence[tuple[Mechanism, _Found]]) -> Arena:
         blocks.append(
             Block(f"{m.name}({f.kind} of {f.basis.names[0]})", "shape", own, f.basis.prior, usual, len(shapes))
         )
-        shapes.append(Shape(m, f.basis.names, f.basis))
+        shapes.append(Shape(m, f.basis.names, f.basis, f.manner))
         sd.append(np.full(k, m.usual))
         n += k
     tolerance = np.zeros((n, n))
@@ -123,7 +124,11 @@ def _interval(t: FloatArray, weight: FloatArray, score: FloatArray) -> _Found | 
     points = np.linspace(t[0], t[-1], 4 * POINTS)
     at_points = np.interp(points, t, column)[:, None]
     basis = Basis(("t",), column[:, None], np.eye(1), points[:, None], at_points, np.ones(points.size, dtype=bool))
-    return _Found("interval", gain, basis, 0.5 * EDGES**2)
+    begin, end = (f"{t[min(i, t.size - 1)]:.0f} s" for i in (low, high))
+    manner = (
+        f"from {begin} to {end}" if low > 0 and high < t.size else f"from {begin} on" if low > 0 else f"until {end}"
+    )
+    return _Found("interval", manner, gain, basis, 0.5 * EDGES**2)
 
 
 def _trapezoid(n: int, low: int, high: int, rise: int) -> FloatArray:
@@ -159,7 +164,9 @@ def _wave(name: str, x: FloatArray, weight: FloatArray, score: FloatArray, used:
     at = 2.0 * np.pi * best[1] * points
     grid = (low + span * points)[:, None]
     basis = Basis((name,), columns, np.eye(2), grid, _circle(at).T, np.ones(points.size, dtype=bool))
-    return _Found("wave", best[0], basis, (most - LEAST_PERIODS) / STEP)
+    unit = "m" if name == "position" else "s"
+    manner = f"in waves of {span / best[1]:.3g} {unit}" if best[1] >= 1.0 else ""
+    return _Found("wave", manner, best[0], basis, (most - LEAST_PERIODS) / STEP)
 
 
 def _circle(phase: FloatArray) -> FloatArray:

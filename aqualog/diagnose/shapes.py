@@ -83,11 +83,15 @@ MECHANISMS: tuple[Mechanism, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A mechanism over coordinates: `basis` (n, K) with the covariance of its coefficients at a usual size of one."""
+    """A mechanism over coordinates: `basis` (n, K) with the covariance of its coefficients at a usual size of one.
+
+    `manner`: in words, where it is no smooth function.
+    """
 
     mechanism: Mechanism
     coordinates: tuple[str, ...]
     basis: Basis
+    manner: str = ""
 
     @property
     def key(self) -> str:

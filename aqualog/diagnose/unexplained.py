@@ -150,7 +150,7 @@ def described(
     nearest, cosine = _nearest(field.blocks, gram, m, fit.mean[own])
     r = Remainder(
         channel, s.coordinates, share, math.nan, s.basis.points, f, f - half, f + half, tuple(alike), nearest, cosine,
-        "", s.mechanism.name, s.mechanism.unit, clear.probability,
+        "", s.mechanism.name, s.mechanism.unit, clear.probability, s.manner,
     )  # fmt: skip
     return replace(r, sentence=describe(s.mechanism, r))
 

@@ -122,8 +122,8 @@ ALIKE = 0.9  # cosine from which a known effect looks nearly the same
 def describe(mechanism: Mechanism, r: Remainder) -> str:
     """Sentences: mechanism and coordinate, its largest value, coordinates that explain it as well, similar effects."""
     title = _CHANNELS.get(r.channel, (r.channel, "?"))[0]
-    of = " and ".join(_word(n) for n in r.depends_on)
-    text = f"Unexplained: {mechanism.title} goes with {of} (probability {r.probability:.2f}"
+    how = r.manner or f"goes with {' and '.join(_word(n) for n in r.depends_on)}"
+    text = f"Unexplained: {mechanism.title} {how} (probability {r.probability:.2f}"
     text += f"; {r.share:.0%} of the variance of the {title}"
     sure = np.isfinite(r.f) & ((r.low > 0.0) | (r.high < 0.0))
     if sure.any():
@@ -142,9 +142,10 @@ def describe(mechanism: Mechanism, r: Remainder) -> str:
 
 
 def short_form(remainder: Remainder) -> str:
-    """`a force on the car that goes with speed`."""
+    """`a force on the car that goes with speed`, `a force on the car from 66 s to 145 s`."""
     title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), remainder.channel)
-    return f"{title} that goes with {' and '.join(_word(n) for n in remainder.depends_on)}"
+    how = remainder.manner or f"that goes with {' and '.join(_word(n) for n in remainder.depends_on)}"
+    return f"{title} {how}"
 
 
 def _word(name: str) -> str:

@@ -1,11 +1,14 @@
 """Intervals and waves over time and place: found where they are, and not in slow noise."""
 
+import re
+
 import numpy as np
 import pytest
 
 from aqualog.diagnose.compete import compete
 from aqualog.diagnose.elements import with_elements
 from aqualog.diagnose.unexplained import unknown_forms
+from aqualog.diagnose.unknown_term import short_form
 from tests.diagnose.test_unexplained import arena, slow
 
 
@@ -28,6 +31,11 @@ def test_a_force_that_comes_and_goes(rise):
     assert np.sqrt(np.mean((r.f - truth) ** 2)) < 40.0
     assert r.f.max() == pytest.approx(220.0, rel=0.2)
     assert np.abs(r.f[r.x[:, 0] < 80.0]).max() < 1e-9
+    if rise < 1.0:
+        begin, end = map(float, re.fullmatch(r"from (\d+) s to (\d+) s", r.manner).groups())
+        assert (begin, end) == (pytest.approx(95.3, abs=2.0), pytest.approx(161.7, abs=2.0))
+        assert f"Unexplained: a force on the car {r.manner} (probability" in r.sentence
+        assert short_form(r) == f"a force on the car {r.manner}"
 
 
 def test_a_wave_of_the_road():
@@ -36,6 +44,8 @@ def test_a_wave_of_the_road():
     r = forms[0]
     truth = 150.0 * np.sin(2.0 * np.pi * r.x[:, 0] / 310.0 + 0.7)
     assert np.corrcoef(r.f, truth)[0, 1] > 0.95
+    length = re.fullmatch(r"a force on the car in waves of (\d+) m", short_form(r)).group(1)
+    assert float(length) == pytest.approx(310.0, abs=3.0)
 
 
 @pytest.mark.parametrize("seed", [13, 14, 15, 16])

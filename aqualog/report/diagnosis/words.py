@@ -40,6 +40,7 @@ COORDINATES: dict[str, tuple[str, str, float, float]] = {
     "a_x": ("acceleration", "m/s²", 1.0, 0.0),
     "a_y": ("lateral acceleration", "m/s²", 1.0, 0.0),
     "yaw_rate": ("yaw rate", "rad/s", 1.0, 0.0),
+    "since_braking": ("time since braking", "s", 1.0, 0.0),
     "steer_angle": ("steer angle", "rad", 1.0, 0.0),
     "water_depth": ("water depth", "mm", 1e3, 0.0),
     "temperature": ("temperature", "°C", 1.0, -273.15),
