@@ -25,7 +25,18 @@ from aqualog.diagnose.spectrum import Weighing, weighing
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
 
-__all__ = ["CHUNK", "Arena", "Part", "arena_of", "blocks_of", "known_only", "make_arena", "products", "unit_force"]
+__all__ = [
+    "CHUNK",
+    "SHAPE_PRIOR",
+    "Arena",
+    "Part",
+    "arena_of",
+    "blocks_of",
+    "known_only",
+    "make_arena",
+    "products",
+    "unit_force",
+]
 
 # of an effect at any place, of a shape of a mechanism, and of a road that is not even, on one drive (K)
 KNOWN_PRIOR, SHAPE_PRIOR, ROAD_PRIOR = 0.03, 0.01, 0.2
@@ -76,10 +87,6 @@ class Arena:
         if b.kind == "effect":
             return self.evidence.asked[b.tag].effect.name
         return f"{self.shapes[b.tag].mechanism.name}()"
-
-    def is_along(self, block: Block) -> bool:
-        """Whether a block is a function of time or place."""
-        return block.kind != "effect" and self.shapes[block.tag].along
 
     def drawn(self, part: int, block: Block) -> FloatArray:
         """Scaled columns (k, C, n) of a block along a part."""

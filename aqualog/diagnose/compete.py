@@ -21,7 +21,6 @@ __all__ = ["Fitted", "Members", "Posterior", "compete", "fitted", "rule"]
 
 ROUGHLY = 2  # sets that are carried on while the noise is sought
 ROUNDS = 4  # of noise, each after what the one before has found
-EACH = 2  # candidates, by coloured and by white noise, that a noise is tried after
 PAIRS, SEED = 2, 20  # of draws of a set's values
 CLEARLY = 1.0  # [nats] that a noise must make the measurement more likely
 
@@ -89,7 +88,7 @@ def compete(arena: Arena) -> Posterior:
 
 def _beside(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
     """A set, and the set with each of the blocks that gain most beside it."""
-    return [best, *((*best, m) for m in first_of(arena.blocks, inner, best)[:EACH])]
+    return [best, *((*best, m) for m in first_of(arena.blocks, inner, best))]
 
 
 def _after(arena: Arena, noise: _Noise) -> _Noise:

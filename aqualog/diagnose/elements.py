@@ -1,4 +1,4 @@
-"""Steps, intervals and waves: unknown forms of few values over time and place.
+"""Intervals and waves: unknown forms of few values over time and place.
 
 A smooth function of time with a dozen values cannot be distinguished from slow noise. An offset that begins and ends,
 or a wave of one length, says the same with two or three values, which slow noise cannot do.
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.diagnose.arena import Arena
+from aqualog.diagnose.arena import SHAPE_PRIOR, Arena
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.competition import Block
 from aqualog.diagnose.noise import white_noise
@@ -78,7 +78,7 @@ def _extended(arena: Arena, made: Sequence[tuple[Mechanism, _Found]]) -> Arena:
         k = f.basis.columns.shape[1]
         own = tuple(range(n, n + k))
         # one of all that were tried is left
-        usual = math.log(0.01 / max(each, 1)) - math.log(f.tried)
+        usual = math.log(SHAPE_PRIOR / max(each, 1)) - math.log(f.tried)
         blocks.append(
             Block(f"{m.name}({f.kind} of {f.basis.names[0]})", "shape", own, f.basis.prior, usual, len(shapes))
         )
@@ -149,7 +149,6 @@ def _wave(name: str, x: FloatArray, weight: FloatArray, score: FloatArray, used:
     z = np.where(known, (x - low) / span, 0.0)
     w, s = np.where(known, weight, 0.0), np.where(known, score, 0.0)
     most = min(PERIODS, float(known.sum()) / SAMPLES_A_WAVE)
-    # a wave must not be shorter than samples where the drive is fastest
     best: tuple[float, float] = (0.0, 0.0)
     for f in np.arange(LEAST_PERIODS, most, STEP):
         gain = _gain(_circle(2.0 * np.pi * f * z), w, s)

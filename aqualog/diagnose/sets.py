@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ __all__ = [
 WIDTH = 8
 MOST = 4  # blocks in one set
 SWAPPED = 3  # sets in which every member is exchanged
-FEW = 4  # first candidates
+FEW = 2  # first candidates
 DIES = 6.0  # [nats] behind the best set, at which a level of larger sets ends the search
 SINGULAR = 1e-3  # share of a column's energy that the others of its set must leave
 SMALLEST = 1e-12
@@ -113,17 +113,15 @@ def grouped(names: Sequence[frozenset[str]], share: Sequence[float]) -> Grouped:
     return Grouped(tuple(tuple(g) for g in order), marginal)
 
 
-def first_of(
-    blocks: Sequence[Block], inner: FloatArray, beside: Members = (), *, but: Container[int] = ()
-) -> list[int]:
-    """The few blocks that gain most beside a set, without those `but`."""
+def first_of(blocks: Sequence[Block], inner: FloatArray, beside: Members = ()) -> list[int]:
+    """The few blocks that gain most beside a set."""
     state = start(inner)
     for m in beside:
         state = added(state, m, blocks[m])
     gains = [
         (scored(state, b)[0] + b.log_prior, i)
         for i, b in enumerate(blocks)
-        if i not in beside and i not in but and _shows(state, b, inner)
+        if i not in beside and _shows(state, b, inner)
     ]
     return [i for gain, i in sorted(gains, reverse=True)[:FEW] if gain > 0.0]
 

@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.spline import Basis, basis
 
@@ -97,15 +95,6 @@ class Shape:
     def key(self) -> str:
         """`force(v_x)`."""
         return f"{self.mechanism.name}({', '.join(self.coordinates)})"
-
-    @property
-    def along(self) -> bool:
-        """Whether it runs with time or place: no property that another drive would show."""
-        return bool(set(ALONG) & set(self.coordinates))
-
-    def columns(self, response: FloatArray) -> FloatArray:
-        """Residual-shaped columns (K, C, n) of a response (C, n) to a unit."""
-        return np.asarray(self.basis.columns.T[:, None, :] * response[None])
 
 
 def shapes(coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, has: Sequence[str]) -> tuple[Shape, ...]:

@@ -98,6 +98,16 @@ def test_a_frozen_accelerometer_is_left_out_where_it_is_frozen():
     assert d.mask[:180].all()
 
 
+def test_the_time_since_braking_counts_from_its_end():
+    """From 24 to 15 m/s in 6 s; before, braking was long ago."""
+    slow = ((0.0, 24.0), (30.0, 24.0), (36.0, 15.0), (90.0, 15.0))
+    at = prepare(signals(speed=slow), CAR, "a").coordinates["since_braking"]
+    assert at[100] == pytest.approx(60.0)
+    assert at[330] == pytest.approx(0.0, abs=0.1)
+    assert at[600] == pytest.approx(60.0 - 36.0, abs=1.5)
+    assert "since_braking" not in prepare(plain(), CAR, "a").coordinates
+
+
 def test_braking_is_left_out_where_the_torque_does_not_hold_it():
     log = plain()
     p = np.where(np.arange(log.frame.height) // 100 == 30, 10e5, 0.0)
