@@ -43,7 +43,7 @@ KNOWN_PRIOR, SHAPE_PRIOR, ROAD_PRIOR = 0.03, 0.01, 0.2
 MOST_BLOCKS = 12000  # of 0.1 s that compete; a longer drive does with its best 20 min
 FORCE_N = 100.0  # of the force whose response stands for any force
 TOLERATED = ("v_x", "torque", "a_y", "a_x")  # coordinates along which a car and its simulation differ anyway
-CHUNK = 4096  # entries of rows that are multiplied together
+CHUNK, PIECE = 4096, 512  # entries of rows that are multiplied together, in double and in single precision
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,25 +97,19 @@ class Arena:
         modulation = s.basis.columns[self.rows[part]].T * self.sd[c, None]
         return np.asarray(modulation[:, None, :] * p.responses[s.mechanism.source][None])
 
-    def inner(self, weighings: Sequence[Weighing], only: BoolArray | None = None) -> FloatArray:
-        """Inner products (K + 1, K + 1) of all columns, the residual last, summed over the parts.
-
-        `only` (K,): columns that are wanted; the others are left zero.
-        """
+    def inner(self, weighings: Sequence[Weighing]) -> FloatArray:
+        """Inner products (K + 1, K + 1) of all columns, the residual last, summed over the parts."""
         total = np.zeros((self.width + 1, self.width + 1))
-        wanted = np.ones(self.width, dtype=bool) if only is None else only
-        used = np.flatnonzero(np.append(wanted, True))
-        at = np.cumsum(wanted) - 1
-        known = np.flatnonzero(wanted[: self.evidence.count])
+        k = self.evidence.count
         for i, (p, w) in enumerate(zip(self.parts, weighings, strict=True)):
-            rows = np.empty((used.size, w.width), dtype=np.float32)
-            rows[: known.size] = w.single(p.signatures if only is None else p.signatures[known])
-            rows[: known.size] *= self.sd[known, None].astype(np.float32)
+            rows = np.empty((self.width + 1, w.width), dtype=np.float32)
+            rows[:k] = w.single(p.signatures)
+            rows[:k] *= self.sd[:k, None].astype(np.float32)
             for b in (*self.blocks, *self.forgiven):
-                if b.kind != "effect" and np.any(wanted[list(b.columns)]):
-                    rows[at[list(b.columns)]] = w.rows(self.drawn(i, b))
+                if b.kind != "effect":
+                    rows[list(b.columns)] = w.rows(self.drawn(i, b))
             rows[-1] = w.rows(p.residual[None])[0]
-            total[np.ix_(used, used)] += products(rows)
+            total += products(rows)
         return total
 
     def white(self) -> FloatArray:
@@ -143,15 +137,21 @@ class Arena:
         return forgiving(gram, self.tolerance).gram
 
     def made(self, part: int, values: FloatArray) -> FloatArray:
-        """What scaled values (K,) of all columns make of the residual of a part. (C, n)"""
+        """What scaled values (m, K) of all columns make of the residual of a part. (m, C, n)"""
         p, k = self.parts[part], self.evidence.count
         scaled = values * self.sd
-        out = np.tensordot(scaled[:k], p.signatures, axes=1)
+        used = np.flatnonzero(scaled[:, :k].any(axis=0))
+        out = np.tensordot(scaled[:, used], p.signatures[used], axes=1)
+        by_source: dict[str, FloatArray] = {}
         for b in (*self.blocks, *self.forgiven):
-            v = scaled[list(b.columns)]
+            v = scaled[:, list(b.columns)]
             if b.kind != "effect" and np.any(v):
                 s = self.shapes[b.tag]
-                out += (s.basis.columns[self.rows[part]] @ v) * p.responses[s.mechanism.source]
+                size = v @ s.basis.columns[self.rows[part]].T
+                known = by_source.get(s.mechanism.source)
+                by_source[s.mechanism.source] = size if known is None else known + size
+        for source, size in by_source.items():
+            out += size[:, None, :] * p.responses[source]
         return np.asarray(out)
 
     def weighed(self, residuals: Sequence[Sequence[FloatArray]]) -> tuple[Weighing, ...]:
@@ -289,9 +289,9 @@ def _tolerance(evidence: Evidence, made: Sequence[Shape], blocks: Sequence[Block
 
 
 def products(rows: npt.NDArray[np.float32]) -> FloatArray:
-    """Inner products of single-precision rows, in double precision."""
+    """Inner products of single-precision rows; of short pieces in single precision, their sum in double."""
     total = np.zeros((len(rows), len(rows)))
-    for i in range(0, rows.shape[1], CHUNK):
-        x = rows[:, i : i + CHUNK].astype(np.float64)
+    for i in range(0, rows.shape[1], PIECE):
+        x = np.ascontiguousarray(rows[:, i : i + PIECE])
         total += x @ x.T
     return total

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.arena import Arena
+from aqualog.diagnose.arena import Arena, products
 from aqualog.diagnose.competition import COARSE, Block, State
 from aqualog.diagnose.evidence import Evidence, forgiving
 from aqualog.diagnose.hypotheses import THREADS
+from aqualog.diagnose.noise import Spectra, bridged, spectra
 from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, evidence_of, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
@@ -23,6 +24,7 @@ ROUGHLY = 2  # sets that are carried on while the noise is sought
 ROUNDS = 4  # of noise, each after what the one before has found
 PAIRS, SEED = 2, 20  # of draws of a set's values
 CLEARLY = 1.0  # [nats] that a noise must make the measurement more likely
+NEGLIGIBLE = 0.03  # variance, in units of white noise's, of a direction of the tolerances that is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,15 +43,23 @@ def fitted(arena: Arena, tolerant: FloatArray, members: Sequence[int]) -> Fitted
 
 @dataclass(frozen=True, slots=True)
 class _Noise:
-    """A noise beside a set; `gram` (K + 1, K + 1) at least of the set and the tolerances.
+    """A noise beside a set, with the set's values there.
 
     `likely`: log of the measurement's marginal likelihood under noise, tolerances and the set, with the set's prior.
     """
 
     members: Members
     weighings: tuple[Weighing, ...]
-    gram: FloatArray
+    fit: Fitted
     likely: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Deviations:
+    """What cars and files differ by anyway along each part, as transforms of few columns of independent unit values."""
+
+    arena: Arena
+    columns: tuple[Spectra, ...]
 
 
 def compete(arena: Arena) -> Posterior:
@@ -61,24 +71,25 @@ def compete(arena: Arena) -> Posterior:
     """
     white = arena.white()
     whitely = arena.tolerant(white)
-    noise = _noise(arena, arena.weighed([[p.residual] for p in arena.parts]), ())
+    deviations = _deviations(arena, white)
+    noise = _beside(deviations, (), None)
     gram = arena.inner(noise.weighings)
     for _ in range(ROUNDS):
         tolerant = arena.tolerant(gram)
         sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram), width=ROUGHLY)
         best = max(sets, key=lambda k: sets[k])
-        coloured = _beside(arena, tolerant, best)
-        others = [*_beside(arena, whitely, best), *_beside(arena, whitely, ())[1:]]
-        starts = [replace(noise, members=m, gram=gram) for m in coloured]
-        starts += [replace(noise, members=m, gram=white) for m in dict.fromkeys(others)]
+        starts = [(m, fitted(arena, tolerant, m)) for m in _first(arena, tolerant, best)]
+        coloured = len(starts)
+        others = [*_first(arena, whitely, best), *_first(arena, whitely, ())[1:]]
+        starts += [(m, fitted(arena, whitely, m)) for m in dict.fromkeys(others)]
         with ThreadPoolExecutor(THREADS) as pool:
-            tried = list(pool.map(lambda n: _after(arena, n), starts))
+            tried = list(pool.map(lambda s: _beside(deviations, *s), starts))
         # white noise is wrong: a second step is fairer
-        tried.append(_after(arena, max(tried[len(coloured) :], key=lambda n: n.likely)))
+        tried.append(_after(deviations, max(tried[coloured:], key=lambda n: n.likely)))
         better = max(tried, key=lambda n: n.likely)
         if better.likely < noise.likely + CLEARLY:
             break
-        noise = _after(arena, better)
+        noise = max(better, _after(deviations, better), key=lambda n: n.likely)
         gram = arena.inner(noise.weighings)
     tolerant = arena.tolerant(COARSE * gram)
     sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram))
@@ -86,35 +97,61 @@ def compete(arena: Arena) -> Posterior:
     return Posterior(found.sets, found.probability, found.marginal, found.blocks, gram, tolerant, noise.weighings)
 
 
-def _beside(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
+def _first(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
     """A set, and the set with each of the blocks that gain most beside it."""
     return [best, *((*best, m) for m in first_of(arena.blocks, inner, best))]
 
 
-def _after(arena: Arena, noise: _Noise) -> _Noise:
-    """The noise that its set leaves: a step of expectation and maximisation [dempster1977].
+def _deviations(arena: Arena, white: FloatArray) -> _Deviations:
+    """Main directions of the tolerances; what the others do is small beside white noise, and smaller beside any other."""
+    k = np.flatnonzero((np.diag(arena.tolerance) > 0.0) & (np.diag(white)[:-1] > 1e-12))
+    P = arena.tolerance[np.ix_(k, k)]
+    root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
+    w, V = np.linalg.eigh(root.T @ white[np.ix_(k, k)] @ root)
+    values = np.zeros((int((w > NEGLIGIBLE).sum()), arena.width))
+    values[:, k] = (root @ V[:, w > NEGLIGIBLE]).T
+    drawn = (spectra(bridged(arena.made(i, values), p.mask)) for i, p in enumerate(arena.parts))
+    return _Deviations(arena, tuple(drawn))
+
+
+def _after(deviations: _Deviations, noise: _Noise) -> _Noise:
+    return _beside(deviations, noise.members, noise.fit)
+
+
+def _beside(deviations: _Deviations, members: Members, fit: Fitted | None) -> _Noise:
+    """The noise that a set of these values leaves: a step of expectation and maximisation [dempster1977].
 
     The set's values are not exactly known: draws of what is left keep the noise from being too small. What the car
     differs by anyway stays in the noise: it is of the size of the simulator's own errors, for which no noise stands.
     """
-    if not noise.members:
-        return _noise(arena, arena.weighed([[p.residual] for p in arena.parts]), ())
-    fit = fitted(arena, arena.tolerant(noise.gram), noise.members)
-    z = np.random.default_rng(SEED).standard_normal((PAIRS, len(fit.mean))) @ np.linalg.cholesky(fit.covariance).T
-    values = np.zeros((2 * PAIRS, arena.width))
-    values[:, fit.columns] = fit.mean + np.concatenate([z, -z])
-    left = [[p.residual - arena.made(i, v) for v in values] for i, p in enumerate(arena.parts)]
-    return _noise(arena, arena.weighed(left), noise.members)
-
-
-def _noise(arena: Arena, weighings: tuple[Weighing, ...], members: Members) -> _Noise:
-    used = np.diag(arena.tolerance) > 0.0
-    used[[c for m in members for c in arena.blocks[m].columns]] = True
-    gram = arena.inner(weighings, used)
-    forgiven = forgiving(gram, arena.tolerance)
-    gained = evidence_of(arena.blocks, forgiven.gram, members) + sum(arena.blocks[m].log_prior for m in members)
+    arena = deviations.arena
+    if fit is None or not members:
+        left = [p.residual[None] for p in arena.parts]
+    else:
+        z = np.random.default_rng(SEED).standard_normal((PAIRS, len(fit.mean))) @ np.linalg.cholesky(fit.covariance).T
+        values = np.zeros((2 * PAIRS, arena.width))
+        values[:, fit.columns] = fit.mean + np.concatenate([z, -z])
+        left = [p.residual - arena.made(i, values) for i, p in enumerate(arena.parts)]
+    weighings = arena.weighed(left)
+    own, r = [], len(deviations.columns[0].values)
+    at = r
+    for m in members:
+        b = arena.blocks[m]
+        own.append(replace(b, columns=tuple(range(at, at + len(b.columns)))))
+        at += len(b.columns)
+    gram = np.zeros((at + 1, at + 1))
+    for i, (p, w) in enumerate(zip(arena.parts, weighings, strict=True)):
+        drawn = w.rows(np.concatenate([*(arena.drawn(i, arena.blocks[m]) for m in members), p.residual[None]]))
+        gram += products(np.concatenate([w.again(deviations.columns[i]), drawn], dtype=np.float32))
+    allowed = np.zeros((at, at))
+    allowed[:r, :r] = np.eye(r)
+    forgiven = forgiving(gram, allowed)
+    numbers = tuple(range(len(own)))
+    gained = evidence_of(own, forgiven.gram, numbers) + sum(b.log_prior for b in own)
     likely = gained - 0.5 * float(forgiven.gram[-1, -1]) - forgiven.room - sum(w.sharpness for w in weighings)
-    return _Noise(members, weighings, gram, likely)
+    found = fitted_in(own, forgiven.gram, numbers)
+    columns = [c for m in members for c in arena.blocks[m].columns]
+    return _Noise(members, weighings, replace(found, columns=columns), likely)
 
 
 def rule(evidence: Evidence, blocks: Sequence[Block], gram: FloatArray) -> MayJoin:

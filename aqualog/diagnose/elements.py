@@ -51,7 +51,7 @@ def with_elements(arena: Arena) -> Arena:
     used = part.mask
     deviations = arena.tolerance @ arena.tolerant(arena.white())[:-1, -1]
     white = white_noise(part.residual, used, contrasts(part.channels)).rotation
-    left = white @ (part.residual - arena.made(0, deviations))
+    left = white @ (part.residual - arena.made(0, deviations[None])[0])
     # a kerb or a shift of a second is no form
     most = OUTLIER * np.median(np.abs(left[:, used]), axis=1, keepdims=True)
     left = np.clip(left, -most, most)

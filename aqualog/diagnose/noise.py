@@ -28,6 +28,7 @@ _ORDERS = (1, 2, 3, 4, 6, 8, 9, 10, 11)
 MEMORY = 130
 AFTER_GAP = 6  # [samples] whose past is bridged
 HUBER = 3.0  # [sd] larger innovations weigh less
+AROUND, FEW = 100, 20.0  # [samples] to either side, over which their size is found; of the whole drive's that count too
 RIDGE = 1e-6
 # [m/s^2], [m/s], [N] white noise that every channel is taken to have besides: without it, every smooth signal would be
 # predictable from its past and would count as noise
@@ -79,9 +80,13 @@ def bridged(x: FloatArray, mask: BoolArray) -> FloatArray:
     good = np.flatnonzero(mask)
     if good.size == 0:
         return np.zeros_like(x)
-    flat = x.reshape(-1, x.shape[-1])
-    at = np.arange(x.shape[-1])
-    return np.array([np.interp(at, good, row[good]) for row in flat]).reshape(x.shape)
+    bad = np.flatnonzero(~mask)
+    after = np.searchsorted(good, bad)
+    left, right = good[np.maximum(after - 1, 0)], good[np.minimum(after, good.size - 1)]
+    share = np.clip((bad - left) / np.maximum(right - left, 1), 0.0, 1.0)
+    out = np.array(x, dtype=np.float64)
+    out[..., bad] = (1.0 - share) * x[..., left] + share * x[..., right]
+    return out
 
 
 def spectra(x: FloatArray) -> Spectra:
@@ -137,10 +142,11 @@ def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> N
         for c in range(C):
             taps[c] = _autoregression(z[c], weights[c], (FLOOR / float(scale[c])) ** 2)
         e = _filtered(z, taps)
-        sd: FloatArray = 1.4826 * np.median(np.abs(e[:, used]), axis=1) + 1e-15
-        size = np.abs(e) / sd[:, None]
-        weights = np.where(size > HUBER, HUBER / np.maximum(size, 1e-12), 1.0) * used
-    count = weights.sum(axis=1)
+        local = _local(e, used)
+        size = np.abs(e) / local
+        robust = np.where(size > HUBER, HUBER / np.maximum(size, 1e-12), 1.0) * used
+        weights = robust / (local / np.exp(np.log(local).mean(axis=1, keepdims=True))) ** 2
+    count = robust.sum(axis=1)
     root = np.sqrt(weights)
     loss = np.array([np.count_nonzero(t) for t in taps], dtype=np.float64)
     cov = (e * root) @ (e * root).T / np.sqrt(np.outer(count - loss, count - loss))
@@ -161,6 +167,20 @@ def white_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) ->
 def for_mask(noise: Noise, mask: BoolArray) -> Noise:
     """The same noise on another drive: full weight wherever it can be used."""
     return Noise(noise.rotation, noise.taps, noise.shaping, np.ones((len(noise.taps), 1)) * _settled(mask))
+
+
+def _local(e: FloatArray, used: BoolArray) -> FloatArray:
+    """Size of innovations (C, n) over the samples around each: rough roads and slow wheels make more noise. (C, n)"""
+    sd: FloatArray = 1.4826 * np.median(np.abs(e[:, used]), axis=1, keepdims=True) + 1e-15
+    clipped = np.where(used, np.minimum(np.abs(e), HUBER * sd), 0.0) ** 2
+    window = np.ones(2 * AROUND + 1)
+
+    def total(x: FloatArray) -> FloatArray:
+        return np.convolve(x, window, "same")
+
+    # samples of the whole drive besides: a stretch with few of its own has the size of all
+    square = np.array([total(x) for x in clipped]) + sd**2 * FEW
+    return np.asarray(np.sqrt(square / (total(used.astype(np.float64)) + FEW)))
 
 
 def _settled(mask: BoolArray) -> BoolArray:

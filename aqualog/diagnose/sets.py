@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.core.records import FloatArray
-from aqualog.diagnose.competition import SCALES, Block, State, added, scored, start, values
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.diagnose.competition import SCALES, Block, Packed, State, added, packed, scored, scores, start, values
 
 __all__ = [
     "Fitted", "Grouped", "MayJoin", "Members", "Sets", "evidence_of", "first_of", "fitted_in", "grouped", "ranked",
@@ -118,12 +118,9 @@ def first_of(blocks: Sequence[Block], inner: FloatArray, beside: Members = ()) -
     state = start(inner)
     for m in beside:
         state = added(state, m, blocks[m])
-    gains = [
-        (scored(state, b)[0] + b.log_prior, i)
-        for i, b in enumerate(blocks)
-        if i not in beside and _shows(state, b, inner)
-    ]
-    return [i for gain, i in sorted(gains, reverse=True)[:FEW] if gain > 0.0]
+    gains = _gains(state, blocks, packed(blocks), inner)
+    order = np.argsort(-gains, kind="stable")[: FEW + len(beside)].tolist()
+    return [i for i in order if i not in beside and gains[i] > 0.0][:FEW]
 
 
 def searched(
@@ -142,11 +139,14 @@ def searched(
         Sets that are carried on.
     """
 
+    together = packed(blocks)
+
     def joining(state: State) -> list[tuple[int, float]]:
+        gains = _gains(state, blocks, together, inner)
         return [
-            (i, scored(state, b)[0] + b.log_prior)
-            for i, b in enumerate(blocks)
-            if i not in state.members and may_join(state, b) and _shows(state, b, inner)
+            (i, float(gains[i]))
+            for i in np.flatnonzero(gains > -np.inf).tolist()
+            if i not in state.members and may_join(state, blocks[i])
         ]
 
     states = [start(inner)]
@@ -177,13 +177,30 @@ def searched(
     return sets
 
 
-def _shows(state: State, block: Block, inner: FloatArray) -> bool:
-    """Whether a set leaves enough of a single column, and the values are not clearly beyond their bounds."""
-    c, A = list(block.columns), state.inner
-    if len(c) == 1 and A[c[0], c[0]] < max(SINGULAR * inner[c[0], c[0]], SMALLEST):
-        return False
-    if block.low is None or block.high is None:
-        return True
-    cov = np.linalg.inv(A[np.ix_(c, c)] + np.linalg.inv(SCALES[-1] ** 2 * block.prior))
-    value, reach = cov @ A[c, -1], BEYOND * np.sqrt(np.diag(cov))
-    return bool(np.all(value >= block.low - reach) and np.all(value <= block.high + reach))
+def _gains(
+    state: State, blocks: Sequence[Block], together: Sequence[Packed], inner: FloatArray
+) -> FloatArray:  # fmt: skip
+    """What each block gains beside a set, with its prior; minus infinity where it does not show. (B,)"""
+    out = np.full(len(blocks), -np.inf)
+    prior = np.array([b.log_prior for b in blocks])
+    for own in together:
+        out[own.at] = np.where(_show(state.inner, own, inner), scores(state.inner, own).gain + prior[own.at], -np.inf)
+    return out
+
+
+def _show(beside: FloatArray, own: Packed, inner: FloatArray) -> BoolArray:
+    """Whether a set leaves enough of a single column, and the values are not clearly beyond their bounds. (B,)"""
+    c = own.columns
+    out = np.ones(len(c), dtype=bool)
+    if c.shape[1] == 1:
+        k = c[:, 0]
+        out = beside[k, k] >= np.maximum(SINGULAR * inner[k, k], SMALLEST)
+    bounded = np.flatnonzero((np.isfinite(own.low) | np.isfinite(own.high)).any(axis=1) & out)
+    if bounded.size:
+        c, root = c[bounded], SCALES[-1] * own.root[bounded]
+        A = beside[c[:, :, None], c[:, None, :]]
+        cov = np.linalg.inv(A + np.linalg.inv(root @ root.transpose(0, 2, 1)))
+        value = (cov @ beside[c, -1][..., None])[..., 0]
+        reach = BEYOND * np.sqrt(np.diagonal(cov, axis1=1, axis2=2))
+        out[bounded] = ((value >= own.low[bounded] - reach) & (value <= own.high[bounded] + reach)).all(axis=1)
+    return out

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.diagnose.noise import Noise, bridged, fit_noise, good_size, spectra, whitened
+from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, good_size, spectra, whitened
 
 __all__ = ["Weighing", "weighing"]
 
@@ -56,8 +56,14 @@ class Weighing:
         """Arrays (k, C, n) as rows (k, M)."""
         out = np.empty((len(x), self.width))
         for i in range(0, len(x), CHUNK):
-            out[i : i + CHUNK] = self._rows(np.asarray(x[i : i + CHUNK], dtype=np.float64))
+            out[i : i + CHUNK] = self._rows(spectra(bridged(np.asarray(x[i : i + CHUNK], dtype=np.float64), self.mask)))
         return out
+
+    def again(self, x: Spectra) -> FloatArray:
+        """The rows of arrays whose transforms are known: they stay the same for every noise."""
+        return np.concatenate(
+            [self._rows(x.of(range(i, min(i + CHUNK, len(x.values))))) for i in range(0, len(x.values), CHUNK)]
+        )
 
     def single(self, x: FloatArray) -> npt.NDArray[np.float32]:
         """The same in single precision, which takes half the memory."""
@@ -66,8 +72,8 @@ class Weighing:
             out[i : i + CHUNK] = self.rows(x[i : i + CHUNK])
         return out
 
-    def _rows(self, x: FloatArray) -> FloatArray:
-        flat = whitened(spectra(bridged(x, self.mask)), self.noise).reshape(x.shape)
+    def _rows(self, x: Spectra) -> FloatArray:
+        flat = whitened(x, self.noise).reshape(x.values.shape)
         lines = np.matmul(self.inverse, _lines(flat[..., self.used], self.size).transpose(2, 1, 0))  # (F, C, k)
         return np.concatenate([lines.real, lines.imag]).reshape(-1, len(flat)).T
 

@@ -404,7 +404,7 @@ _ALL = [
         (Parameter("length", "m", 0.0, 0.3, 0.0, 3.0, 0.05, "longitudinal and lateral"),),
         _plus(relaxation_length="length"),
         _WHEEL_PLACES, twins=("signal_delay",),
-        drive=DriveSearch((_SPEEDS,), tolerance=0.15), belongs="tyre",
+        drive=DriveSearch((_SPEEDS,), tolerance=0.15, is_quick=True), belongs="tyre",
     ),
     Effect(
         "contact_loss", "lost contact on water [-]", "The water lifts {gain:.2f} times as much of the contact.",

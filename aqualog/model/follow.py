@@ -23,7 +23,7 @@ from aqualog.model.state import DRIVE, column, resistance_at, rolling_state, whe
 from aqualog.model.term import Model, Setup
 from aqualog.physics.load import G
 
-__all__ = ["FOLLOW_RATE", "Course", "Replay", "follow", "led_truth", "replay", "setup_along", "shown"]
+__all__ = ["FOLLOW_RATE", "STEP_S", "Course", "Replay", "follow", "led_truth", "replay", "setup_along", "shown"]
 
 STEP_S = 5e-3
 RECORD_S = 1e-2
@@ -60,7 +60,9 @@ def setup_along(vehicle: Vehicle, course: Course, model: Model) -> Setup:
     return model.apply(Setup(plant, PERFECT, scenario))
 
 
-def follow(vehicle: Vehicle, course: Course, model: Model, *, rate: float = FOLLOW_RATE) -> dict[str, FloatArray]:
+def follow(
+    vehicle: Vehicle, course: Course, model: Model, *, rate: float = FOLLOW_RATE, step: float = STEP_S
+) -> dict[str, FloatArray]:  # fmt: skip
     """Return the sensor signals of a measured drive for a car that is that of the file and the model.
 
     Parameters
@@ -70,6 +72,8 @@ def follow(vehicle: Vehicle, course: Course, model: Model, *, rate: float = FOLL
         is undone before they drive the simulation: a torque that is reported late is applied earlier.
     rate : float
         Rate at which the speed is drawn to the measured one. [1/s] 0: it runs free from the first speed on.
+    step : float
+        Step of the integration, at most 10 ms. [s]
 
     Returns
     -------
@@ -83,7 +87,7 @@ def follow(vehicle: Vehicle, course: Course, model: Model, *, rate: float = FOLL
         If the simulation diverges.
     """
     setup = setup_along(vehicle, course, model)
-    return shown(led_truth(setup, course, rate=rate), setup.sensors, course)
+    return shown(led_truth(setup, course, rate=rate, step=step), setup.sensors, course)
 
 
 def shown(truth: Truth, sensors: Sensors, course: Course) -> dict[str, FloatArray]:
@@ -104,11 +108,11 @@ def shown(truth: Truth, sensors: Sensors, course: Course) -> dict[str, FloatArra
     return {n: x if x.size == course.t.size else np.resize(x, course.t.size) for n, x in out.items()}
 
 
-def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Truth:
+def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE, step: float = STEP_S) -> Truth:
     """Return the simulated drive without sensors, every 10 ms."""
     plant, scenario = setup.plant, setup.scenario
-    n = max(2, math.ceil(float(course.t[-1]) / STEP_S - 1e-9))
-    fine: FloatArray = np.arange(n + 1, dtype=np.float64) * STEP_S
+    n = max(2, math.ceil(float(course.t[-1]) / step - 1e-9))
+    fine: FloatArray = np.arange(n + 1, dtype=np.float64) * step
     torque = np.array([
         _undone(course.t, course.torque[i], setup.sensors, f"torque_{w}", fine) for i, w in enumerate(WHEELS)
     ])  # fmt: skip
@@ -120,14 +124,14 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE) -> Tru
         grade = np.asarray(np.interp(np.interp(fine, course.t, way), *np.array(scenario.grade).T))
     steer = _undone(course.t, course.steer, setup.sensors, "steer_angle", fine)
     controls = _undriven(n + 1, v_target=speed, steer=steer, grade=grade, follow=rate)
-    road = build_road(replace(scenario, grade=()), float(speed.sum()) * STEP_S * 1.02 + 50.0)
+    road = build_road(replace(scenario, grade=()), float(speed.sum()) * step * 1.02 + 50.0)
     v, theta = float(max(speed[0], V_START)), float(grade[0])
     drag, rolling = resistance_at(plant, v, G * math.sin(theta))
     force = float(torque[:, 0].sum()) * plant.torque_gain / float(plant.r_l.mean()) - float(rolling.sum()) - drag
     start = rolling_state(plant, v=v, a=force / (plant.mass + plant.towed_mass), drive=0.0, split_rear=0.5)
     start[DRIVE] = 0.0
-    every = round(RECORD_S / STEP_S)
-    rows = kernel.run(n, STEP_S, every, start, plant, road, controls, np.ascontiguousarray(torque.T))
+    every = round(RECORD_S / step)
+    rows = kernel.run(n, step, every, start, plant, road, controls, np.ascontiguousarray(torque.T))
     if not np.isfinite(rows).all():
         raise ConfigError("the simulation along the drive diverged", hint="less extreme parameters of car or model")
     t: FloatArray = np.arange(rows.shape[0], dtype=np.float64) * RECORD_S

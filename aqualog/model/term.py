@@ -75,7 +75,8 @@ class DriveSearch:
     this one on every log. `check`: how it is read without driving.
 
     `turns`: the sign changes on the way back; `is_shift`: it moves signals in time; `is_relative`: at all its places
-    together it changes nothing; `is_single`: it counts once per car, wherever it acts.
+    together it changes nothing; `is_single`: it counts once per car, wherever it acts; `is_quick`: it acts within 10 ms,
+    so that only short steps of the integration show it.
     """
 
     needs: tuple[Need, ...] = ()
@@ -93,6 +94,7 @@ class DriveSearch:
     is_shift: bool = False
     is_relative: bool = False
     is_single: bool = False
+    is_quick: bool = False
 
 
 @dataclass(frozen=True, slots=True)
