@@ -16,7 +16,7 @@ from aqualog.core.units import is_unit, parse_unit
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import block_means, block_step, channels_of
 from aqualog.diagnose.floating import floating
-from aqualog.diagnose.inputs import SPEED_S, quiet_speed, quiet_torque, smooth
+from aqualog.diagnose.inputs import SPEED_S, confirmed_torque, quiet_speed, quiet_torque, smooth
 from aqualog.diagnose.unlogged import (
     A_MOST,
     BRAKE_PRESSURE,
@@ -120,7 +120,9 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         # signals have the file's torque gain already: it is applied on reading
         logged = np.array([filled.get(f"torque_{w}", np.zeros(n)) for w in WHEELS])
         told = [signals.origins[f"torque_{w}"].rate_hz for w in vehicle.driven if f"torque_{w}" in signals.origins]
+        moves = filled["a_x"] if "a_x" in filled else np.gradient(v, dt)
         torque = quiet_torque(logged, dt, min(told, default=None))
+        torque = confirmed_torque(torque, moves, dt, 1.0 / (vehicle.mass * vehicle.r_e("fl")))
     else:
         logged = torque = needed_torque(v, vehicle, dt)
         notes.append("no wheel torque in the log: replaced by the torque that the model needs for the measured speed")

@@ -7,10 +7,11 @@ residual and in the signature of an effect. A regression would then find effects
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aqualog.core.records import FloatArray
 
-__all__ = ["SPEED_S", "quiet", "quiet_speed", "quiet_torque", "smooth"]
+__all__ = ["SPEED_S", "confirmed_torque", "quiet", "quiet_speed", "quiet_torque", "smooth"]
 
 SPEED_BAND_HZ = (2.0, 4.5)  # there a speed is noise: 0.1 m/s^2 are below 8 mm/s; beyond, slow buses are interpolated
 TORQUE_BAND = (0.1, 0.2)  # of the rate at which a torque is sampled: there it is noise, pedals and tyres are slower
@@ -24,6 +25,10 @@ MEDIAN = 0.4549
 END_S = 1.0  # [s] for the values at the beginning and end of a signal
 STANDS_OUT, LEAST_EVENT = 4.0, 10.0  # standard deviations, and [N m] of an axle: braking, not noise
 BESIDE_EVENT_S = 0.5  # [s]
+SEGMENT_S, NEIGHBOURS = 12.8, 0.3  # stretches whose spectra are averaged, and share of a frequency to either side
+SURE_HZ = (0.05, 0.3)  # drivers act there: whatever a torque has there is torque
+LATEST_S = 0.3  # that a torque is early or late
+WITHIN = (0.5, 1.5)  # of the expected acceleration per torque, which the car must show for the comparison
 LOCAL = 9  # frequencies over which a spectrum is smoothed
 OVER = 3.0  # multiple of the noise that a frequency needs to pass: one of a thousand passes by chance (D)
 
@@ -120,6 +125,60 @@ def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) ->
         apart = quiet(half, dt, rate_hz) if float(np.sqrt((half**2).mean())) > least else np.zeros_like(half)
         out[a], out[b] = 0.5 * axle + apart, 0.5 * axle - apart
     return out
+
+
+def confirmed_torque(torque: FloatArray, a: FloatArray, dt: float, per_torque: float) -> FloatArray:
+    """Wheel torques with each frequency weighted by the share that the car's acceleration confirms.
+
+    The noise of a real torque has a colour, and within the frequencies of drivers it cannot be seen in the torque
+    alone. But it does not accelerate the car: the cross spectrum of torque and acceleration over the power of the torque
+    is the share of torque in it. Where a share would be noise, Wiener's filter [wiener1949] leaves as much.
+
+    Parameters
+    ----------
+    torque : array (4, n)
+        [N·m]
+    a : array (n,)
+        Measured acceleration, finite; its own noise does not matter. [m/s²]
+    dt : float
+        [s]
+    per_torque : float
+        Acceleration per torque of the car of the file, which is compared at low frequencies only. [m/s²/(N·m)]
+
+    Returns
+    -------
+    torque : array (4, n)
+        Unchanged if the drive is too short or steady to show it.
+    """
+    n, size = a.size, round(SEGMENT_S / dt)
+    if n < 4 * size:
+        return torque
+    cut = np.lib.stride_tricks.sliding_window_view(np.array([torque.sum(axis=0), a]), size, axis=1)[:, :: size // 2]
+    lines = np.fft.rfft((cut - cut.mean(axis=2, keepdims=True)) * np.hanning(size), axis=2)
+    f = np.fft.rfftfreq(size, dt)
+    cross, power = (_neighbours((lines[0].conj() * x).mean(axis=0)) for x in (lines[1], lines[0]))
+    low, most = (f >= SURE_HZ[0]) & (f <= SURE_HZ[1]), f <= LEAST_BAND_HZ[1]
+    gain = float(cross[low].real.sum() / max(float(power[low].real.sum()), 1e-300)) / per_torque
+    if not WITHIN[0] <= gain <= WITHIN[1]:
+        return torque
+    late = np.linspace(-LATEST_S, LATEST_S, 61)
+    turns = np.exp(2j * np.pi * np.outer(late, f))
+    best = turns[int(np.argmax((turns * np.where(most, cross, 0.0)).real.sum(axis=1)))]
+    share = np.clip((best * cross).real / np.maximum(power.real, 1e-300) / (gain * per_torque), 0.0, 1.0)
+    share[f <= SURE_HZ[1]] = 1.0
+    ends = np.array([_ends(x, dt) for x in torque])
+    line = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * np.linspace(0.0, 1.0, n)
+    mirrored = np.concatenate([torque - line, (line - torque)[:, ::-1]], axis=1)
+    weights = np.interp(np.fft.rfftfreq(2 * n, dt), f, share)
+    return np.asarray(line + np.fft.irfft(np.fft.rfft(mirrored, axis=1) * weights, 2 * n, axis=1)[:, :n])
+
+
+def _neighbours(x: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Means over neighbouring frequencies. (F,)"""
+    k = np.arange(x.size)
+    reach = np.minimum((NEIGHBOURS * k).astype(np.intp), np.minimum(k, x.size - 1 - k))
+    total = np.concatenate([[0.0], np.cumsum(x)])
+    return np.asarray((total[k + reach + 1] - total[k - reach]) / (2.0 * reach + 1.0))
 
 
 def _events(x: FloatArray, dt: float) -> FloatArray:

@@ -21,6 +21,7 @@ __all__ = ["Weighing", "weighing"]
 BANDWIDTH = 0.3  # of the frequency: share that spectra are averaged over to either side
 NARROWEST, WIDEST = 10, 40  # bins to either side
 SLOPED = 60  # lines whose power may follow a power law
+FASTEST_HZ, BLOCK_S = 1.5, 0.1  # half of the log-likelihood counts there: cars pitch at 1 to 2 Hz (K); samples' step
 CHUNK = 48  # columns that are transformed together
 
 Complex = npt.NDArray[np.complex128]
@@ -98,11 +99,21 @@ def weighing(
     cross = np.concatenate([cross[:1].real.astype(complex), cross])
     cross += 1e-6 * np.trace(cross, axis1=1, axis2=2).real[:, None, None] * np.eye(raw.shape[-1])
     root = np.linalg.cholesky(cross) * pilot[:, :, None]
-    inverse = np.linalg.inv(root).astype(np.complex128)
+    counts = _trusted(np.arange(raw.shape[1]) / size)
+    inverse = np.sqrt(counts)[:, None, None] * np.linalg.inv(root).astype(np.complex128)
     lines = np.full(raw.shape[1], 2.0)
     lines[0] = 1.0
     logdet = 2.0 * np.log(np.abs(np.diagonal(root, axis1=1, axis2=2))).sum(axis=1)
-    return Weighing(noise, mask, used, inverse, size, noise.sharpness + 0.5 * count / size * float(lines @ logdet))
+    logdet -= 2.0 * np.log(np.abs(np.fft.rfft(noise.taps, size)) + 1e-12).sum(axis=0)
+    share = float(lines @ counts / lines.sum())
+    sharpness = share * noise.sharpness + 0.5 * count / size * float((lines * counts) @ logdet)
+    return Weighing(noise, mask, used, inverse, size, sharpness)
+
+
+def _trusted(f: FloatArray) -> FloatArray:
+    """Share of the log-likelihood that counts at frequencies f [1/sample]: a simulator without suspension, driveline
+    and the tyres' own motion says little of a car's fast movements."""
+    return np.asarray(1.0 / (1.0 + (f / (FASTEST_HZ * BLOCK_S)) ** 4))
 
 
 def _lines(x: FloatArray, size: int) -> Complex:
