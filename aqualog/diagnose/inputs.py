@@ -28,6 +28,7 @@ BESIDE_EVENT_S = 0.5  # [s]
 SEGMENT_S, NEIGHBOURS = 12.8, 0.3  # stretches whose spectra are averaged, and share of a frequency to either side
 SURE_HZ = (0.05, 0.3)  # drivers act there: whatever a torque has there is torque
 LATEST_S = 0.3  # that a torque is early or late
+SURELY = 2.0  # standard deviations by which a share may be overestimated
 WITHIN = (0.5, 1.5)  # of the expected acceleration per torque, which the car must show for the comparison
 LOCAL = 9  # frequencies over which a spectrum is smoothed
 OVER = 3.0  # multiple of the noise that a frequency needs to pass: one of a thousand passes by chance (D)
@@ -156,16 +157,20 @@ def confirmed_torque(torque: FloatArray, a: FloatArray, dt: float, per_torque: f
     cut = np.lib.stride_tricks.sliding_window_view(np.array([torque.sum(axis=0), a]), size, axis=1)[:, :: size // 2]
     lines = np.fft.rfft((cut - cut.mean(axis=2, keepdims=True)) * np.hanning(size), axis=2)
     f = np.fft.rfftfreq(size, dt)
-    cross, power = (_neighbours((lines[0].conj() * x).mean(axis=0)) for x in (lines[1], lines[0]))
+    reach, cross = _neighbours((lines[0].conj() * lines[1]).mean(axis=0))
+    power, moved = (_neighbours((np.abs(x) ** 2).mean(axis=0))[1].real for x in lines)
     low, most = (f >= SURE_HZ[0]) & (f <= SURE_HZ[1]), f <= LEAST_BAND_HZ[1]
-    gain = float(cross[low].real.sum() / max(float(power[low].real.sum()), 1e-300)) / per_torque
+    gain = float(cross[low].real.sum() / max(float(power[low].sum()), 1e-300)) / per_torque
     if not WITHIN[0] <= gain <= WITHIN[1]:
         return torque
     late = np.linspace(-LATEST_S, LATEST_S, 61)
     turns = np.exp(2j * np.pi * np.outer(late, f))
     best = turns[int(np.argmax((turns * np.where(most, cross, 0.0)).real.sum(axis=1)))]
-    share = np.clip((best * cross).real / np.maximum(power.real, 1e-300) / (gain * per_torque), 0.0, 1.0)
-    share[f <= SURE_HZ[1]] = 1.0
+    # what is sure: torque that is left out is lost, noise that is left in becomes an effect
+    coherence = np.clip(np.abs(cross) ** 2 / np.maximum(power * moved, 1e-300), 0.0, 1.0)
+    unsure = np.sqrt((1.0 - coherence) * moved * power / (lines.shape[1] * (2.0 * reach + 1.0)))
+    share = ((best * cross).real - SURELY * unsure) / np.maximum(power, 1e-300) / (gain * per_torque)
+    share = np.where(f <= SURE_HZ[1], 1.0, np.clip(share, 0.0, 1.0))
     ends = np.array([_ends(x, dt) for x in torque])
     line = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * np.linspace(0.0, 1.0, n)
     mirrored = np.concatenate([torque - line, (line - torque)[:, ::-1]], axis=1)
@@ -173,12 +178,12 @@ def confirmed_torque(torque: FloatArray, a: FloatArray, dt: float, per_torque: f
     return np.asarray(line + np.fft.irfft(np.fft.rfft(mirrored, axis=1) * weights, 2 * n, axis=1)[:, :n])
 
 
-def _neighbours(x: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Means over neighbouring frequencies. (F,)"""
+def _neighbours(x: NDArray[np.complex128] | FloatArray) -> tuple[NDArray[np.intp], NDArray[np.complex128]]:
+    """Number of neighbours to either side, and means over these frequencies. (F,)"""
     k = np.arange(x.size)
     reach = np.minimum((NEIGHBOURS * k).astype(np.intp), np.minimum(k, x.size - 1 - k))
     total = np.concatenate([[0.0], np.cumsum(x)])
-    return np.asarray((total[k + reach + 1] - total[k - reach]) / (2.0 * reach + 1.0))
+    return reach, np.asarray((total[k + reach + 1] - total[k - reach]) / (2.0 * reach + 1.0), dtype=np.complex128)
 
 
 def _events(x: FloatArray, dt: float) -> FloatArray:
