@@ -154,7 +154,7 @@ class Arena:
             out += size[:, None, :] * p.responses[source]
         return np.asarray(out)
 
-    def weighed(self, residuals: Sequence[Sequence[FloatArray]]) -> tuple[Weighing, ...]:
+    def weighed(self, residuals: Sequence[Sequence[FloatArray] | FloatArray]) -> tuple[Weighing, ...]:
         """The weighing of each part by the noise of draws of what is left of it."""
         return tuple(weighing(r, p.mask, contrasts(p.channels)) for r, p in zip(residuals, self.parts, strict=True))
 

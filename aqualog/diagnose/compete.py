@@ -103,7 +103,7 @@ def _first(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
 
 
 def _deviations(arena: Arena, white: FloatArray) -> _Deviations:
-    """Main directions of the tolerances; what the others do is small beside white noise, and smaller beside any other."""
+    """Main directions of the tolerances; what the others do is small beside white noise, smaller beside any other."""
     k = np.flatnonzero((np.diag(arena.tolerance) > 0.0) & (np.diag(white)[:-1] > 1e-12))
     P = arena.tolerance[np.ix_(k, k)]
     root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))

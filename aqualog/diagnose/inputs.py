@@ -131,9 +131,9 @@ def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) ->
 def confirmed_torque(torque: FloatArray, a: FloatArray, dt: float, per_torque: float) -> FloatArray:
     """Wheel torques with each frequency weighted by the share that the car's acceleration confirms.
 
-    The noise of a real torque has a colour, and within the frequencies of drivers it cannot be seen in the torque
-    alone. But it does not accelerate the car: the cross spectrum of torque and acceleration over the power of the torque
-    is the share of torque in it. Where a share would be noise, Wiener's filter [wiener1949] leaves as much.
+    The noise of a real torque has a colour: within the frequencies of drivers, the torque alone does not show it. But
+    it does not accelerate the car. The cross spectrum of torque and acceleration, over the power of the torque, is the
+    share of torque in it, which is the weight of Wiener's filter [wiener1949].
 
     Parameters
     ----------

@@ -171,16 +171,16 @@ def for_mask(noise: Noise, mask: BoolArray) -> Noise:
 
 def _local(e: FloatArray, used: BoolArray) -> FloatArray:
     """Size of innovations (C, n) over the samples around each: rough roads and slow wheels make more noise. (C, n)"""
-    sd: FloatArray = 1.4826 * np.median(np.abs(e[:, used]), axis=1, keepdims=True) + 1e-15
-    clipped = np.where(used, np.minimum(np.abs(e), HUBER * sd), 0.0) ** 2
+    usual: FloatArray = 1.4826 * np.median(np.abs(e[:, used]), axis=1, keepdims=True) + 1e-15
     window = np.ones(2 * AROUND + 1)
-
-    def total(x: FloatArray) -> FloatArray:
-        return np.convolve(x, window, "same")
-
-    # samples of the whole drive besides: a stretch with few of its own has the size of all
-    square = np.array([total(x) for x in clipped]) + sd**2 * FEW
-    return np.asarray(np.sqrt(square / (total(used.astype(np.float64)) + FEW)))
+    count = np.convolve(used, window, "same") + FEW
+    local = np.broadcast_to(usual, e.shape)
+    for _ in range(2):
+        # an outlier must not make its neighbours look small, nor a rough stretch its own samples look like outliers
+        square = np.where(used, np.minimum(np.abs(e), HUBER * local), 0.0) ** 2
+        # samples of the whole drive besides: a stretch with few of its own has the size of all
+        local = np.sqrt((np.array([np.convolve(x, window, "same") for x in square]) + usual**2 * FEW) / count)
+    return np.asarray(local)
 
 
 def _settled(mask: BoolArray) -> BoolArray:

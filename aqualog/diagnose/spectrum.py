@@ -80,7 +80,7 @@ class Weighing:
 
 
 def weighing(
-    residuals: Sequence[FloatArray], mask: BoolArray, contrasts: FloatArray, noise: Noise | None = None
+    residuals: Sequence[FloatArray] | FloatArray, mask: BoolArray, contrasts: FloatArray, noise: Noise | None = None
 ) -> Weighing:  # fmt: skip
     """The weighing by the noise of residuals (C, n) from which known effects have been subtracted.
 

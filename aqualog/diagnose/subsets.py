@@ -58,10 +58,11 @@ def compatible(evidence: Evidence, members: Sequence[int]) -> bool:
 def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tuple[int, ...]]:
     """Sets of hypotheses that a relation makes equal to `members`, none of which holds them all; sorted indices.
 
-    Any two effects of a relation span what all three do. Effects are taken at the whole car or at their usual place.
+    Any two effects of a relation span what all three do. Effects are taken at the whole car or at their usual place;
+    none joins its own twin.
     """
     out = []
-    for relation in [(e.name, *e.drive.equals) for e in EFFECTS.values() if e.drive.equals]:
+    for relation in [(e.name, *others) for e in EFFECTS.values() for others in e.drive.equals]:
         usual = {
             h.effect.name: i for i, h in enumerate(asked)
             if h.effect.name in relation and h.where in (None, h.effect.default)
@@ -70,9 +71,14 @@ def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tupl
         if not related or len(usual) < len(relation):
             continue
         for two in combinations(usual.values(), 2):
-            if not related <= set(two):
-                out.append(tuple(sorted({*members} - related | set(two))))
-    return out
+            rest = {*members} - related
+            if not related <= set(two) and not any(_are_twins(asked[a], asked[b]) for a in rest for b in two):
+                out.append(tuple(sorted(rest | set(two))))
+    return list(dict.fromkeys(out))
+
+
+def _are_twins(a: Hypothesis, b: Hypothesis) -> bool:
+    return b.effect.name in a.effect.twins or a.effect.name in b.effect.twins
 
 
 def supported(evidence: Evidence) -> Evidence:

@@ -1,8 +1,8 @@
 """Quantities that no vehicle file or simulator has exactly: taken into account, but never reported as causes.
 
-The geometry of curves, the height of the centre of mass, the form of a tyre's curve, offsets of steering and gyro. Each
-has the form of an effect, so that simulation gives its change of the residuals. `friction` is mostly the curvature of a
-tyre's curve well below its peak: laws go from a parabola to a straight line.
+The geometry of curves, the height of the centre of mass, the yaw inertia, the form of a tyre's curve, offsets of
+steering and gyro. Each has the form of an effect, so that simulation gives its change of the residuals. `friction` is
+mostly the curvature of a tyre's curve well below its peak: laws go from a parabola to a straight line.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ TOLERANCES: tuple[Effect, ...] = (
     _of("track", "-", 0.02, _plant(lambda p, x: p._replace(track=p.track * (1.0 + x)))),
     _of("h_cg", "-", 0.1, _plant(lambda p, x: p._replace(h_cg=p.h_cg * (1.0 + x)))),
     _of("axle_distance", "m", 0.03, _plant(lambda p, x: p._replace(l_f=p.l_f + x, l_r=p.l_r - x))),
+    _of("yaw_inertia", "-", 0.2, _plant(lambda p, x: p._replace(I_zz=p.I_zz * max(1.0 + x, 0.05)))),
     _of("cornering_front", "-", 0.2, _plant(lambda p, x: p._replace(
         cornering_slope=p.cornering_slope * [1.0 + x, 1.0 + x, 1.0, 1.0]))),
     _of("cornering_rear", "-", 0.2, _plant(lambda p, x: p._replace(

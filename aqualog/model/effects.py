@@ -183,12 +183,13 @@ _WATER: Need = "water depth"
 _TORQUE: Need = "wheel torque"
 _SPEEDS: Need = "wheel speeds"
 _PAIR = ("a_x", "a_y")
-# relation (D): an offset b of the accelerometer is a slope b / g and a rolling resistance -b / g, but for its slip
-_LIKE_AN_OFFSET = ("road_grade", "rolling_resistance")
+# relations (D): an offset b of the accelerometer is a slope b / g and a force -m b against the motion, but for its slip
+_LIKE_AN_OFFSET = (("road_grade", "rolling_resistance"), ("road_grade", "brake_drag"))
 # Tolerances are given where a vehicle file or a simulator errs by more than a third of the smallest size: slip slopes
 # change by 5 % with a few degrees, the driveline turns with the wheels, half a sample lies between two buses, scrub and
 # crowned roads differ, tyres follow their load by other laws, warm up and grow a little on every drive (K). Tyres of
-# one size differ by 1 % in radius, wheels by a third in inertia, slopes of the slip from 25 to 40 (K).
+# one size differ by 1 % in radius, wheels by a third in inertia, slopes of the slip from 25 to 40 (K). Every tyre
+# builds up its forces over some decimetres.
 _ALL = [
     Effect(
         "road_grade", "slope angle of the road [rad]", "The road climbs by {grade:.1%}.",
@@ -404,7 +405,7 @@ _ALL = [
         (Parameter("length", "m", 0.0, 0.3, 0.0, 3.0, 0.05, "longitudinal and lateral"),),
         _plus(relaxation_length="length"),
         _WHEEL_PLACES, twins=("signal_delay",),
-        drive=DriveSearch((_SPEEDS,), tolerance=0.15, is_quick=True), belongs="tyre",
+        drive=DriveSearch((_SPEEDS,), tolerance=0.3, is_quick=True), belongs="tyre",
     ),
     Effect(
         "contact_loss", "lost contact on water [-]", "The water lifts {gain:.2f} times as much of the contact.",

@@ -71,12 +71,12 @@ class DriveSearch:
 
     `tolerance`: standard deviation that is not worth naming; None: a third of the smallest size, 0: a car has the
     effect or not; `tolerance_at` some places. `axle_key`: start of an axle's key in the vehicle file, which the first
-    parameter changes. `equals`: effects that together look like
-    this one on every log. `check`: how it is read without driving.
+    parameter changes. `equals`: sets of effects that together look like this one on every log. `check`: how it is read
+    without driving.
 
     `turns`: the sign changes on the way back; `is_shift`: it moves signals in time; `is_relative`: at all its places
-    together it changes nothing; `is_single`: it counts once per car, wherever it acts; `is_quick`: it acts within 10 ms,
-    so that only short steps of the integration show it.
+    together it changes nothing; `is_single`: it counts once per car, wherever it acts; `is_quick`: it acts within
+    10 ms, so that only short steps of the integration show it.
     """
 
     needs: tuple[Need, ...] = ()
@@ -88,7 +88,7 @@ class DriveSearch:
     tolerance: float | None = None
     tolerance_at: Mapping[str, float] = field(default_factory=dict)
     axle_key: str = ""
-    equals: tuple[str, ...] = ()
+    equals: tuple[tuple[str, ...], ...] = ()
     check: Check | None = None
     turns: bool = False
     is_shift: bool = False

@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 from aqualog.core.notation import WHEELS
+from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, signatures, value_in, with_values
+from aqualog.diagnose.spectrum import weighing
 from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model.effects import EFFECTS
-from aqualog.model.follow import setup_along
+from aqualog.model.follow import STEP_S, setup_along
 from aqualog.model.term import Model
 from tests.diagnose.test_drive import CAR, NOISY, changed, plain, signals, term
 
@@ -57,6 +59,32 @@ def test_slip_and_radius_are_not_asked_about_without_wheel_speeds():
     assert not {"slip_stiffness", "tyre_radius", "pressure_loss"} & {h.effect.name for h in asked}
     assert untested["slip_stiffness_drift"] == "no wheel speeds in the log"
     assert {"payload_mass", "rolling_resistance", "signal_delay"} <= {h.effect.name for h in asked}
+
+
+def without_rods():
+    return prepare(changed(plain(), plain().frame.drop([f"tie_rod_{w}" for w in ("fl", "fr")])), CAR, "a")
+
+
+@pytest.mark.parametrize("h", [one("slip_stiffness", "fl"), one("aero_drag"), one("signal_delay", "torque")])
+def test_longer_steps_change_a_signature_by_a_hundredth_at_most(h, monkeypatch):
+    drive = without_rods()
+    base = residual(drive, Model())
+    rough = signatures(drive, Model(), [h], base=base)[0]
+    monkeypatch.setattr("aqualog.diagnose.hypotheses.ROUGH_S", STEP_S)
+    fine = signatures(drive, Model(), [h], base=base)[0]
+    noisy = base + 0.01 * np.random.default_rng(1).standard_normal(base.shape)
+    w = weighing([noisy], drive.mask, contrasts(drive.channels))
+    assert not np.array_equal(rough, fine)
+    assert np.linalg.norm(w.rows(rough - fine)) < 0.01 * np.linalg.norm(w.rows(fine))
+
+
+def test_what_acts_within_milliseconds_is_simulated_in_short_steps(monkeypatch):
+    drive = without_rods()
+    base = residual(drive, Model())
+    h = one("relaxation_length")
+    usual = signatures(drive, Model(), [h], base=base, each=True)[0]
+    monkeypatch.setattr("aqualog.diagnose.hypotheses.ROUGH_S", STEP_S)
+    assert np.array_equal(usual, signatures(drive, Model(), [h], base=base, each=True)[0])
 
 
 @pytest.mark.parametrize(

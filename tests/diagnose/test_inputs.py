@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aqualog.diagnose.inputs import quiet, quiet_speed, quiet_torque, smooth
+from aqualog.diagnose.inputs import confirmed_torque, quiet, quiet_speed, quiet_torque, smooth
 
 DT = 0.01
 T = np.arange(9000) * DT
@@ -92,3 +92,44 @@ def test_a_speed_that_changes_is_kept():
     v = 22.0 + 6.0 * np.sin(2.0 * np.pi * t / 35.0) + 0.5 * np.sin(2.0 * np.pi * t / 8.0)
     noisy = v + 0.03 * np.random.default_rng(5).standard_normal(t.size)
     assert np.abs(quiet_speed(noisy, 0.01) - smooth(v, 0.01, 1.0))[300:-300].max() < 0.02
+
+
+LONG = np.arange(30_000) * DT
+PER_TORQUE = 1.0 / 500.0
+
+
+def coloured(seed, low, high, rms, t=LONG):
+    """Noise of a band. [Hz]"""
+    f = np.fft.rfftfreq(t.size, DT)
+    lines = np.random.default_rng(seed).standard_normal((2, f.size)) * ((f > low) & (f < high))
+    x = np.fft.irfft(lines[0] + 1j * lines[1], t.size)
+    return rms * x / x.std()
+
+
+def wheels(total):
+    return np.array([np.zeros(total.size), np.zeros(total.size), 0.5 * total, 0.5 * total])
+
+
+@pytest.mark.parametrize("late", [0.0, 0.15], ids=["on time", "late"])
+def test_torque_that_does_not_move_the_car_goes_and_what_does_stays(late):
+    real = coloured(1, 0.03, 0.6, 300.0)
+    false = coloured(2, 1.0, 4.0, 60.0)
+    moves = np.roll(real, -round(late / DT)) * 0.9 * PER_TORQUE + np.random.default_rng(3).normal(0.0, 0.1, real.size)
+    out = confirmed_torque(wheels(real + false), moves, DT, PER_TORQUE).sum(axis=0)
+    inside = slice(500, -500)
+    assert (out - real)[inside].std() < 0.2 * 60.0
+    np.testing.assert_allclose(out.mean(), real.mean(), atol=1.0)
+
+
+def test_fast_torque_that_moves_the_car_stays():
+    real = coloured(4, 0.03, 3.0, 300.0)
+    moves = real * PER_TORQUE + np.random.default_rng(5).normal(0.0, 0.02, real.size)
+    out = confirmed_torque(wheels(real), moves, DT, PER_TORQUE).sum(axis=0)
+    assert (out - real)[500:-500].std() < 0.05 * 300.0
+
+
+def test_a_drive_that_shows_nothing_of_it_leaves_the_torque_alone():
+    torque = wheels(coloured(6, 0.03, 3.0, 30.0))
+    assert confirmed_torque(torque, np.zeros(LONG.size), DT, PER_TORQUE) is torque
+    short = torque[:, :3000]
+    assert confirmed_torque(short, short.sum(axis=0) * PER_TORQUE, DT, PER_TORQUE) is short

@@ -5,7 +5,7 @@ import pytest
 from aqualog.diagnose import run
 from aqualog.diagnose.subsets import imitations
 from tests.diagnose.test_run import ask, few, keys, noisy, term, told  # noqa: F401 - `few` is a fixture
-from tests.diagnose.test_subsets import ASKED, AT
+from tests.diagnose.test_subsets import ASKED, AT, hypothesis
 
 BIAS, SLOPE, ROLLING = (AT[k] for k in ("accelerometer_bias@a_x", "road_grade", "rolling_resistance"))
 MASS = AT["payload_mass"]
@@ -30,6 +30,13 @@ def test_a_set_beside_the_relation_has_no_like():
 
 def test_what_is_not_asked_about_is_in_no_set():
     assert imitations([ASKED[BIAS], ASKED[SLOPE]], [0]) == []
+
+
+def test_a_dragging_brake_is_a_rolling_resistance_in_the_relation():
+    brake = hypothesis("brake_drag")
+    asked = [ASKED[BIAS], ASKED[SLOPE], ASKED[ROLLING], brake]
+    assert as_sets(imitations(asked, [0])) == {frozenset((1, 2)), frozenset((1, 3))}
+    assert as_sets(imitations(asked, [1, 3])) == {frozenset((0, 1)), frozenset((0, 3))}
 
 
 @pytest.mark.parametrize("hidden", [term("accelerometer_bias", "a_x", bias=0.05), term("road_grade", grade=0.005)])
