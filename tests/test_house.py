@@ -7,6 +7,7 @@ from statistics import median
 import pytest
 
 import aqualog
+from tests.conftest import LONG
 
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
@@ -59,3 +60,7 @@ def test_modules_and_functions(package):
             assert (function.end_lineno or 0) - function.lineno < LONGEST_FUNCTION, own
             if not is_framed(function) and function.name not in WIDE:
                 assert len(parameters(function)) <= MOST_PARAMETERS, own
+
+
+def test_long_modules_are_there():
+    assert [name for name in LONG if not (TESTS / name).is_file()] == []

@@ -292,10 +292,10 @@ def columns_of(symbol: Symbol, y: FloatArray, vehicle: Vehicle) -> list[tuple[st
     """Return the canonical columns of a signal: axle torque to two wheels, steering wheel angle to road-wheel angle."""
     if symbol.name in ("torque_f", "torque_r"):
         axle = symbol.name[-1]
-        half = pl.Series(0.5 * y).fill_nan(None)
+        half = pl.Series(0.5 * y, nan_to_null=True)
         return [(f"torque_{w}", half) for w in WHEELS if w[0] == axle]
     if symbol.name == "steering_wheel_angle":
-        return [("steer_angle", pl.Series(y / vehicle.steering_ratio).fill_nan(None))]
+        return [("steer_angle", pl.Series(y / vehicle.steering_ratio, nan_to_null=True))]
     if symbol.unit == "bool":
-        return [(symbol.name, pl.Series(y).fill_nan(None).cast(pl.Boolean))]
-    return [(symbol.name, pl.Series(y).fill_nan(None))]
+        return [(symbol.name, pl.Series(y, nan_to_null=True).cast(pl.Boolean))]
+    return [(symbol.name, pl.Series(y, nan_to_null=True))]

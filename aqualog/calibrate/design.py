@@ -52,7 +52,7 @@ def lag_between(x: FloatArray, y: FloatArray, dt: float) -> float:
     if np.count_nonzero(np.isfinite(a + b)) * dt < LEAST_S or most < 1:
         return 0.0
     shifts = np.arange(-most, most + 1)
-    found = np.array([_correlation(a, b, int(k)) for k in shifts])
+    found = _correlations(a, b, most)
     best = int(np.argmax(found))
     if not found[best] > CORRELATION_MIN or best in (0, shifts.size - 1):
         return 0.0
@@ -77,15 +77,24 @@ def _mean(x: FloatArray, seconds: float, dt: float) -> FloatArray:
     return out
 
 
-def _correlation(a: FloatArray, b: FloatArray, k: int) -> float:
-    """Of a[i + k] with b[i]."""
-    x, y = (a[k:], b[: b.size - k]) if k >= 0 else (a[:k], b[-k:])
-    good = np.isfinite(x + y)
-    if not good.any():
-        return 0.0
-    x, y = x[good], y[good]
-    scale = math.sqrt(float(x @ x) * float(y @ y))
-    return float(x @ y) / scale if scale > 0.0 else 0.0
+def _correlations(a: FloatArray, b: FloatArray, most: int) -> FloatArray:
+    """Of a[i + k] with b[i] where both are known, k = -most ... most; 0 where nothing is."""
+    known = [np.isfinite(x) for x in (a, b)]
+    # a zero in place of a gap adds nothing to a product: no pair needs to be picked out again for each k
+    a, b = (np.where(k, x, 0.0) for k, x in zip(known, (a, b), strict=True))
+    of_a, of_b = (k.astype(np.float64) for k in known)
+    squares_a, squares_b, n = a * a, b * b, a.size
+    found = np.zeros(2 * most + 1)
+    for i, k in enumerate(range(-most, most + 1)):
+        late, early = slice(max(k, 0), n + min(k, 0)), slice(max(-k, 0), n - max(k, 0))
+        scale = math.sqrt(_product(squares_a[late], of_b[early]) * _product(of_a[late], squares_b[early]))
+        found[i] = _product(a[late], b[early]) / scale if scale > 0.0 else 0.0
+    return found
+
+
+def _product(x: FloatArray, y: FloatArray) -> float:
+    """Return the inner product without threads, which wait longer for each other than so short a sum takes."""
+    return float(np.einsum("i,i", x, y))
 
 
 WINDOW_S = 2.0  # [s] long against sensor lags (0.1 s), short against manoeuvres

@@ -205,7 +205,7 @@ def _on_water(info: RunInfo, frame: pl.DataFrame, t: FloatArray, labels: tuple[L
     if info.water_from == "labels" and labels is not None:
         return _inside([(x.start_s, x.end_s) for x in labels if x.effect in AQUAPLANING], t)
     if info.water_from == "signal":
-        wet = frame["on_water"].cast(pl.Float64).fill_null(float("nan")).to_numpy()
+        wet = frame["on_water"].cast(pl.Float64).to_numpy()
         edges = np.flatnonzero(np.diff((wet > 0.5).astype(np.int8)))
         out: FloatArray = np.where(np.isnan(wet), np.nan, (wet > 0.5).astype(np.float64))
         for i in edges:

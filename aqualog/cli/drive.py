@@ -45,11 +45,12 @@ def detect(
     from aqualog.core.errors import ConfigError
     from aqualog.face.arguments import refuse_existing
     from aqualog.face.detect import DETECT_FILES, detect
-    from aqualog.io.write_log import check_suffix
-    from aqualog.report.layouts import layout_texts
 
     targets = [out / name for name in DETECT_FILES] if out else []
     if write is not None:
+        from aqualog.io.write_log import check_suffix
+        from aqualog.report.layouts import layout_texts
+
         check_suffix(write)
         targets += [write, *(layout_texts(write, ()) if layouts else ())]
     elif layouts:

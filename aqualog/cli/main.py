@@ -50,7 +50,7 @@ def run() -> None:
     """
     open_streams()
     # a process of one command: modules are no garbage to look for again and again, least of all at its end
-    gc.set_threshold(10_000)
+    gc.set_threshold(200_000, 20)
     atexit.register(gc.freeze)
     for stream in (sys.stdout, sys.stderr):
         # a name that the terminal's code page does not have must not cost the work

@@ -24,8 +24,6 @@ from aqualog.core.vehicle import (
     spread_lines,
     usual,
 )
-from aqualog.model.effects import EFFECTS
-from aqualog.model.term import Term
 
 if TYPE_CHECKING:
     from aqualog.calibrate.records import Calibration, Parameter
@@ -133,6 +131,12 @@ def _source_and_sd(table: Table, name: str, path: str, said: Any) -> Provenance 
 def _known(table: Table) -> dict[str, Known]:
     """Read known faults: `"signal_delay@torque" = { delay = 0.03, spread = 0.005 }`."""
     found: dict[str, Known] = {}
+    if not table.values:
+        return found
+    # the effects bring the simulator's records, a tenth of a second: few vehicle files need them
+    from aqualog.model.effects import EFFECTS
+    from aqualog.model.term import Term
+
     for key, value in table.values.items():
         name, _, where = key.partition("@")
         effect = EFFECTS.get(name)

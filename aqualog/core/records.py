@@ -215,7 +215,7 @@ class Signals:
             return np.full(self.frame.height, np.nan)
         import polars as pl
 
-        return self.frame[symbol].cast(pl.Float64).fill_null(np.nan).to_numpy().astype(np.float64, copy=False)
+        return self.frame[symbol].cast(pl.Float64).to_numpy()
 
 
 @dataclass(frozen=True, slots=True)

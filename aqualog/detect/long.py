@@ -157,7 +157,7 @@ def _named(signals: Signals, piece: Piece) -> Iterator[tuple[tuple[str, str], Fl
 def _coarse(whole: Signals, drive: LongDrive, seen: Mapping[tuple[str, str], FloatArray], dt_ns: int) -> Signals:
     import polars as pl
 
-    columns = {name: pl.Series(x).fill_nan(None) for (kind, name), x in seen.items() if kind == "signal"}
+    columns = {name: pl.Series(x, nan_to_null=True) for (kind, name), x in seen.items() if kind == "signal"}
     columns = {s: x.cast(pl.Boolean) if SYMBOLS[s].unit == "bool" else x for s, x in columns.items()}
     n = next(iter(columns.values())).len() if columns else 0
     empty = {s: pl.Series([], dtype=pl.Float64) for s in drive.plan.symbols}

@@ -133,7 +133,7 @@ class _Columns:
             return self._signals
         import polars as pl
 
-        columns = [pl.Series(n, x).fill_nan(None) for n, x in self._new.items()]
+        columns = [pl.Series(n, x, nan_to_null=True) for n, x in self._new.items()]
         return replace(self._signals, frame=self._signals.frame.with_columns(columns))
 
 

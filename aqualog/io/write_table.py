@@ -107,7 +107,7 @@ def _series(column: TableColumn, name: str) -> pl.Series:
     values = np.ascontiguousarray(column.values, dtype=np.float64)
     if column.name == "t" and column.unit == "s":
         values = np.round(values, 9)  # stamps are whole nanoseconds: 0.07, not 0.07000000000000001
-    return pl.Series(name, values).fill_nan(None)
+    return pl.Series(name, values, nan_to_null=True)
 
 
 def _header(column: TableColumn) -> str:

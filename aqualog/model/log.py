@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 
-from aqualog.align.grid import bin_mean, gap_limit_ns, hold, linear, median_period_ns
+from aqualog.align.grid import bin_mean, gap_limit_ns, hold, linear, median_period_ns, placed
 from aqualog.align.mapping import Entry, SignalMap, resolve
 from aqualog.align.table import build_signals
 from aqualog.core.notation import ACCEPTED, SYMBOLS
@@ -54,7 +55,7 @@ def table_of(simulation: Simulation) -> list[LogGroup]:
     """Put all groups on one grid at the scenario's rate, as in a logger's table."""
     grid = grid_of(simulation)
     return [
-        LogGroup(g.name, {n: (*_about(n), _onto(grid, _stamps(g), n, x)) for n, x in g.columns.items()})
+        LogGroup(g.name, {n: (*_about(n), x) for n, x in _onto(grid, _stamps(g), g.columns).items()})
         for g in simulation.measured
     ]
 
@@ -76,17 +77,22 @@ def _about(name: str) -> tuple[str, str]:
     return (symbol.unit, symbol.meaning) if symbol else TRUTH_SYMBOLS[name]
 
 
-def _onto(grid: TimeArray, t_ns: TimeArray, name: str, x: FloatArray) -> FloatArray:
-    """Resample linearly; hold states; average where a signal is much faster than the grid."""
-    symbol = SYMBOLS.get(name)
-    is_state = symbol is not None and symbol.kind == "state"
-    gap_ns = gap_limit_ns(median_period_ns(t_ns), is_state=is_state)
-    if is_state:
-        return hold(t_ns, x, grid, gap_ns=gap_ns)
-    dt_ns = int(grid[1] - grid[0])
-    if 0 < median_period_ns(t_ns) < dt_ns / 2:
-        return bin_mean(t_ns, x, grid, dt_ns=dt_ns, gap_ns=gap_ns)[0]
-    return linear(t_ns, x, grid, gap_ns=gap_ns)[0]
+def _onto(grid: TimeArray, t_ns: TimeArray, columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Resample linearly; hold states; average where signals are much faster than the grid."""
+    period_ns, dt_ns = median_period_ns(t_ns), int(grid[1] - grid[0])
+    at = placed(t_ns, grid, dt_ns) if t_ns.size else None
+    found = {}
+    for name, x in columns.items():
+        symbol = SYMBOLS.get(name)
+        is_state = symbol is not None and symbol.kind == "state"
+        gap_ns = gap_limit_ns(period_ns, is_state=is_state)
+        if is_state:
+            found[name] = hold(t_ns, x, grid, gap_ns=gap_ns, at=at)
+        elif 0 < period_ns < dt_ns / 2:
+            found[name] = bin_mean(t_ns, x, grid, dt_ns=dt_ns, gap_ns=gap_ns, period_ns=period_ns, at=at)[0]
+        else:
+            found[name] = linear(t_ns, x, grid, gap_ns=gap_ns, period_ns=period_ns, at=at)[0]
+    return found
 
 
 _FILE = "simulated"
@@ -125,7 +131,7 @@ def as_signals(simulation: Simulation, *, vehicle: Vehicle | None = None, truth:
     signals = build_signals(mapped, signal_map=SignalMap(), vehicle=vehicle or simulation.setup.scenario.vehicle)
     if not truth:
         return signals
-    known = [pl.Series(n, x).fill_nan(None) for n, (_, x) in columns.items() if n.startswith("true_")]
+    known = [pl.Series(n, x, nan_to_null=True) for n, (_, x) in columns.items() if n.startswith("true_")]
     # a grid that begins or ends with dropped samples is shorter than the drive
     first = round((signals.start_ns or START_NS) - START_NS) // signals.dt_ns
     known = [s.slice(first, signals.frame.height) for s in known]

@@ -10,15 +10,17 @@ from dataclasses import replace
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from aqualog import __version__
 from aqualog.core.units import displayed_text
 from aqualog.report.sections import Beside, Figures, Part, Report, Residuals, Section, Stack, Table, shown
 from aqualog.report.values import readable
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 __all__ = ["content_policy", "plotly_js", "render", "report_fragment", "report_page", "write_page"]
 
@@ -157,6 +159,8 @@ def _environment(*folders: Path) -> Environment:
 
     The filter `units` shows units in a text one way.
     """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
     found = Environment(
         loader=FileSystemLoader(folders),
         autoescape=True,

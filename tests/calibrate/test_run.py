@@ -9,7 +9,7 @@ import pytest
 from aqualog.align.load import load_signals
 from aqualog.calibrate.balance import energy_offset
 from aqualog.calibrate.derive import calibrated, identified_values
-from aqualog.calibrate.design import lag_between, prepare
+from aqualog.calibrate.design import _correlations, lag_between, prepare
 from aqualog.calibrate.run import calibrate
 from aqualog.calibrate.words import notes
 from aqualog.config.vehicle import calibrated_toml, load_vehicle
@@ -103,6 +103,17 @@ def test_lags_are_found_and_taken_out(ideal):
     assert lag_between(a, late, dt) == pytest.approx(-10 * dt, abs=0.003)
     np.testing.assert_allclose(earlier(late, 10 * dt, dt)[20:-20], a[20:-20], atol=1e-9)
     assert lag_between(np.random.default_rng(1).normal(size=a.size), a, dt) == 0.0
+
+
+def test_correlations_are_those_of_the_pairs_that_are_known():
+    rng = np.random.default_rng(2)
+    a, b = rng.normal(size=(2, 80)).cumsum(axis=1)
+    a[[0, 7, 8, 40]], b[[3, 8, 70, 79]] = np.nan, np.nan
+    for k, found in zip(range(-30, 31), _correlations(a, b, 30), strict=True):
+        pairs = np.array([(a[i + k], b[i]) for i in range(80) if 0 <= i + k < 80])
+        x, y = pairs[np.isfinite(pairs).all(axis=1)].T
+        assert found == pytest.approx(x @ y / np.sqrt((x @ x) * (y @ y)), abs=1e-12)
+    assert not _correlations(np.full(80, np.nan), b, 3).any()
 
 
 def test_late_torque_does_not_bias_mass(ideal):

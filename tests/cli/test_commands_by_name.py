@@ -1,6 +1,7 @@
 """Commands are listed without being imported; what is listed is what they say of themselves."""
 
 import inspect
+import os
 import re
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import typer
 
 from aqualog.cli.commands import COMMANDS
 from tests.commands import run
+from tests.conftest import ROOT
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -66,3 +68,27 @@ def test_modules_are_not_looked_through_for_garbage_at_the_end():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "True"
+
+
+DETECT = """
+import sys
+from aqualog.cli.main import run
+sys.argv = ["aqualog", "detect", *sys.argv[1:], "--quiet"]
+try:
+    run()
+except SystemExit:
+    print("LOADED", *sys.modules)
+"""
+
+
+def test_detect_loads_no_simulator_no_templates_and_no_writers():
+    """A third of what it costs on a short log: what only other commands and a page need."""
+    given = [ROOT / "sample_logs" / name for name in ("lane_drive.mf4", "vehicle.toml")]
+    done = subprocess.run(
+        [sys.executable, "-c", DETECT, given[0], "--vehicle", given[1]], capture_output=True, text=True, check=True,
+        env={**os.environ, "AQUALOG_LIMITS": "off"},
+    )  # fmt: skip
+    loaded = done.stdout.split("LOADED")[1].split()
+    assert "aqualog.detect.stream" in loaded
+    unneeded = ("jinja2", "plotly", "scipy.signal", "pydantic", "aqualog.model", "aqualog.io.write_log")
+    assert [m for m in loaded if m.startswith(unneeded)] == []

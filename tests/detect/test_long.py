@@ -41,7 +41,7 @@ def test_the_document_is_that_of_the_whole_drive(suffix, rows, monkeypatch):
     monkeypatch.setattr(parquet, "_PIECE", 2000)
     monkeypatch.setattr(batches, "_ENOUGH", 2000)
     monkeypatch.setattr(text_file, "LARGE", 1)
-    monkeypatch.setattr(csv, "PIECE", 5000)
+    monkeypatch.setattr(csv, "PIECE", 20_000)
     path, signal_map = inputs(suffix)
     whole = detect_drive(load_signals([path], vehicle=CAR, signal_map=signal_map), CAR)
     loaded = load_drive([path], vehicle=CAR, signal_map=signal_map, least=1)

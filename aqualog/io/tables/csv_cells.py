@@ -86,11 +86,11 @@ class Numbers:
 def numbers(cells: pl.Series, style: Style) -> Numbers:
     """Convert the cells of one column, which are text or read as numbers already; a cell is never guessed at."""
     if cells.dtype == pl.Float64:
-        values: FloatArray = cells.fill_null(np.nan).to_numpy().astype(np.float64)
+        values: FloatArray = cells.to_numpy().astype(np.float64)
         values[~np.isfinite(values)] = np.nan
         return Numbers(values, cells.is_null().to_numpy().copy(), np.zeros(len(cells), dtype=np.bool_))
     found = plain(cells, style).cast(pl.Float64, strict=False)
-    values = found.fill_null(np.nan).to_numpy().astype(np.float64)
+    values = found.to_numpy().astype(np.float64)
     blank = cells.is_null().to_numpy().copy()
     unreadable = np.zeros(len(cells), dtype=np.bool_)
     left: NDArray[np.int64] = (found.is_null() & cells.is_not_null()).arg_true().to_numpy().astype(np.int64)

@@ -342,7 +342,7 @@ def _about(metadata: dict[str, str]) -> dict[str, Any]:
 def _floats(column: pl.Series) -> FloatArray:
     if isinstance(column.dtype, pl.Duration):
         column = (column.to_physical().cast(pl.Int64) * _UNIT_NS[column.dtype.time_unit]).cast(pl.Float64) * 1e-9
-    values: FloatArray = column.cast(pl.Float64).fill_null(np.nan).to_numpy().astype(np.float64)
+    values: FloatArray = column.cast(pl.Float64).to_numpy().astype(np.float64)
     return values
 
 

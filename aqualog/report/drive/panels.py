@@ -42,8 +42,7 @@ def _feature(frame: pl.DataFrame, name: str) -> FloatArray | None:
 
     if name not in frame.columns:
         return None
-    column = frame[name].cast(pl.Float64)
-    values: FloatArray = (column.fill_null(np.nan) if column.null_count() else column).to_numpy()
+    values: FloatArray = frame[name].cast(pl.Float64).to_numpy()
     return values if np.isfinite(values).any() else None
 
 

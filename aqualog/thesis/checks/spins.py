@@ -177,14 +177,15 @@ def aic_gain(v: FloatArray, y: FloatArray) -> tuple[float, float, float]:
     c, v0 : float
         Of the exponential; v0 in the unit of v, between 1 and 200.
     """
-    best = (np.inf, 0.0, 0.0)
-    for v0 in np.geomspace(1.0, 200.0, 400):
-        shape = np.exp((v - v.max()) / v0)
-        c = float(shape @ y / (shape @ shape))
-        rss = float(((y - c * shape) ** 2).sum())
-        best = min(best, (rss, float(c * np.exp(-v.max() / v0)), float(v0)))
+    widths = np.geomspace(1.0, 200.0, 400)
+    shapes = np.exp((v - v.max()) / widths[:, None])
+    sizes = np.einsum("ij,j->i", shapes, y) / np.einsum("ij,ij->i", shapes, shapes)
+    squares = ((y - sizes[:, None] * shapes) ** 2).sum(axis=1)
+    best = int(np.argmin(squares))
+    v0 = float(widths[best])
     rest = y - np.polyval(np.polyfit(v, y, 1), v)
-    return float(v.size * np.log(float(rest @ rest) / best[0])), best[1], best[2]
+    gain = float(v.size * np.log(float(rest @ rest) / squares[best]))
+    return gain, float(sizes[best] * np.exp(-v.max() / v0)), v0
 
 
 def _c18(table: Table) -> Check:

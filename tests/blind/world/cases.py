@@ -28,8 +28,8 @@ from .vehicles import CARS
 from .world import World, nominal_world
 
 __all__ = [
-    "CARS", "EXACT_PROGRAMMES", "NOISES", "POOLS", "PROGRAMMES", "UNKNOWN", "Case", "Hidden", "Spec", "clean_pair", "clean_rows",
-    "hidden_specs", "implied", "make_case", "null_specs", "scaled", "truth", "world_of", "write_case",
+    "CARS", "EXACT_PROGRAMMES", "NOISES", "POOLS", "PROGRAMMES", "UNKNOWN", "Case", "Hidden", "Spec", "clean_drive",
+    "clean_pair", "clean_rows", "hidden_specs", "implied", "make_case", "null_specs", "scaled", "truth", "world_of", "write_case",
 ]  # fmt: skip
 
 EXACT_PROGRAMMES = ("mixed", "motorway", "handling", "stop_and_go")
@@ -111,14 +111,16 @@ def clean_pair(spec: Spec, index: int = 0) -> tuple[Signals, Signals]:
 
     The driver reacts: after a while the two are at slightly different places.
     """
+    return clean_drive(spec, truth(spec), index), clean_drive(spec, implied(spec), index)
+
+
+def clean_drive(spec: Spec, hidden: tuple[Hidden, ...], index: int = 0) -> Signals:
+    """One side of a pair: a drive without noise and gusts, with `hidden` alone."""
     vehicle = CARS[spec.vehicle]
-    pair = []
-    for hidden in (truth(spec), implied(spec)):
-        world = apply(nominal_world(vehicle, spec.tyre), hidden)
-        rows, road = clean_rows(spec, world, index)
-        columns = measure(rows, world, None, _drive_seed(spec, index))
-        pair.append(as_signals(columns, rows, road, vehicle.wheelbase, name="clean", has_v_x=spec.has_v_x))
-    return pair[0], pair[1]
+    world = apply(nominal_world(vehicle, spec.tyre), hidden)
+    rows, road = clean_rows(spec, world, index)
+    columns = measure(rows, world, None, _drive_seed(spec, index))
+    return as_signals(columns, rows, road, vehicle.wheelbase, name="clean", has_v_x=spec.has_v_x)
 
 
 def clean_rows(spec: Spec, world: World, index: int = 0, *, refine: int = 1) -> tuple[np.ndarray, Road]:
