@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from math import inf, isfinite, nan
@@ -27,8 +27,8 @@ from aqualog.physics.hydroplaning import SPIN_UP_RATIO
 from aqualog.physics.water import film_drag, wave_drag
 
 __all__ = [
-    "CRITERIA", "MARKS", "QUANTITIES", "V_MOST", "Compared", "Condition", "Point", "compared", "drag", "full_speed",
-    "points", "read", "rms", "simulated", "tyre_of",
+    "CRITERIA", "MARKS", "QUANTITIES", "V_MOST", "Compared", "Condition", "Point", "compared", "contact", "drag",
+    "full_speed", "points", "read", "rms", "simulated", "tyre_of",
 ]  # fmt: skip
 
 KMH = 1.0 / 3.6  # [m/s]
@@ -67,6 +67,7 @@ class Point:
 
     `tolerance`: how far beyond them the simulator may be. `over`: condition of the denominator of a ratio. `assumed`:
     what of the condition the source does not state. `mark`: key of `MARKS`. `source`: key of `docs/sources.toml`.
+    `reason`: why the simulator is elsewhere, where it is.
     """
 
     id: str
@@ -81,7 +82,8 @@ class Point:
     where: str
     criterion: str = ""
     over: Condition | None = None
-    assumed: tuple[str, ...] = field(default=())
+    assumed: tuple[str, ...] = ()
+    reason: str = ""
 
     @property
     def unit(self) -> str:
@@ -141,7 +143,7 @@ def _point(table: Mapping[str, Any], i: int) -> Point:
     def fail(what: str, expected: str) -> ConfigError:
         return ConfigError(what, where=where, expected=expected)
 
-    known = {*_TEXTS, *_NUMBERS, "low", "high", "tolerance", "speed", "criterion", "over", "assumed"}
+    known = {*_TEXTS, *_NUMBERS, "low", "high", "tolerance", "speed", "criterion", "over", "assumed", "reason"}
     if strange := sorted(set(table) - known):
         raise fail(f"unknown key {strange[0]}", ", ".join(sorted(known)))
     if missing := [k for k in (*_TEXTS, *_NUMBERS, "low", "high", "tolerance") if k not in table]:
@@ -169,8 +171,9 @@ def _point(table: Mapping[str, Any], i: int) -> Point:
     if odd := next((k for k in assumed if k not in _NUMBERS), None):
         raise fail(f"assumed {odd}", ", ".join(_NUMBERS))
     return Point(
-        low=low, high=high, tolerance=tolerance, at=at, criterion=criterion, over=over, assumed=assumed, **texts
-    )
+        low=low, high=high, tolerance=tolerance, at=at, criterion=criterion, over=over, assumed=assumed,
+        reason=table.get("reason", ""), **texts,
+    )  # fmt: skip
 
 
 def _condition(table: Mapping[str, Any], where: str) -> Condition:
@@ -216,7 +219,7 @@ def full_speed(tyre: Tyre, at: Condition, criterion: str = "contact") -> float:
     if criterion == "contact":
         return min(v_full / KMH, V_MOST)
     floats = _SLOWED if criterion == "spin-down" else 1.0
-    grip = _mu(tyre) * friction_ratio(_contact(tyre, at, _SPEEDS / floats))
+    grip = _mu(tyre) * friction_ratio(contact(tyre, at, _SPEEDS / floats))
     resistance = _wheel_force(tyre, at, _SPEEDS / floats) / at.load + _car().rolling_resistance
     margin = grip - resistance if criterion == "spin-down" else grip + resistance - DEMAND
     return min(_crossing(0.0, margin), v_full / KMH, V_MOST)
@@ -234,7 +237,8 @@ def drag(tyre: Tyre, at: Condition, v: FloatArray) -> FloatArray:
     return force
 
 
-def _contact(tyre: Tyre, at: Condition, v: FloatArray) -> FloatArray:
+def contact(tyre: Tyre, at: Condition, v: FloatArray) -> FloatArray:
+    """Share of the contact that is left at speeds (n,) [m/s] on an even road. [-]"""
     v_full = tyre.full_speed(np.asarray(at.depth * 1e-3), np.asarray(at.load), p=at.pressure * 1e5)
     return contact_share(v, v_full, exponent=tyre.contact_exponent)
 
@@ -243,7 +247,7 @@ def _wheel_force(tyre: Tyre, at: Condition, v: FloatArray) -> FloatArray:
     """What the water takes from the rotation of a wheel, as a force at its rim. [N] Rolls at `v`."""
     p, F_z, h_w = at.pressure * 1e5, np.asarray(at.load), np.asarray(at.depth * 1e-3)
     a = contact_half_length(F_z, p=p, a_ref=tyre.half_length, F_z_ref=F_Z_HALF_LENGTH, p_ref=P_HALF_LENGTH)
-    shift = load_shift(_contact(tyre, at, v), a, peak=tyre.wedge_peak) * F_z / _car().r_l_f
+    shift = load_shift(contact(tyre, at, v), a, peak=tyre.wedge_peak) * F_z / _car().r_l_f
     film = film_drag(
         h_w, v, v, width=tyre.width, tread_capacity=tyre.tread_capacity, h_film=tyre.h_film, relief=tyre.groove_relief
     )
@@ -275,11 +279,11 @@ def _full_speed(point: Point, tyre: Tyre) -> float:
 
 
 def _share(point: Point, tyre: Tyre) -> float:
-    return float(_contact(tyre, point.at, np.array([point.at.speed * KMH]))[0])
+    return float(contact(tyre, point.at, np.array([point.at.speed * KMH]))[0])
 
 
 def _fade(point: Point, tyre: Tyre) -> float:
-    ratio = friction_ratio(_contact(tyre, point.at, _SPEEDS))
+    ratio = friction_ratio(contact(tyre, point.at, _SPEEDS))
     return _crossing(0.1, ratio) - _crossing(0.9, ratio)
 
 
