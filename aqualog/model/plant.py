@@ -58,15 +58,19 @@ class Plant(NamedTuple):
     relaxation_length: FloatArray
     wet_friction: FloatArray
     p: FloatArray
+    tread_depth: FloatArray
     tread_capacity: FloatArray
     half_length: FloatArray
     width: FloatArray
     v_anchor: FloatArray
+    pressure_exponent: FloatArray
+    thin_gain: FloatArray
     h_bulk: FloatArray
     h_onset: FloatArray
+    tread_gain: FloatArray
     contact_exponent: FloatArray
     contact_gain: FloatArray  # multiplies the lost contact
-    wedge_peak: FloatArray
+    wedge_arm: FloatArray
     h_film: FloatArray
     groove_relief: FloatArray
     h_wave: FloatArray
@@ -92,8 +96,9 @@ def understeer_gradient(cornering_slope: float) -> float:
 # what a plant takes as it is from vehicle and tyres, and what is added to it, neutral at first
 _OF_CAR = ("mass", "l_f", "l_r", "h_cg", "track", "drag_area", "air_density")
 _OF_TYRES = (
-    "load_sensitivity", "wet_friction", "tread_capacity", "half_length", "width", "v_anchor", "h_bulk", "h_onset",
-    "contact_exponent", "wedge_peak", "h_film", "groove_relief", "h_wave", "h_track", "contact_scatter",
+    "load_sensitivity", "wet_friction", "tread_depth", "tread_capacity", "half_length", "width", "v_anchor",
+    "pressure_exponent", "thin_gain", "h_bulk", "h_onset", "tread_gain", "contact_exponent", "wedge_arm",
+    "h_film", "groove_relief", "h_wave", "h_track", "contact_scatter",
 )  # fmt: skip
 _ADDED = ("head_wind", "cornering_drag", "warmup_extra", "towed_mass", "leak_start")
 _ADDED_AT_WHEELS = ("radius_growth", "brake_drag", "slip_slope_drift", "relaxation_length", "leak_radius", "leak_slope")

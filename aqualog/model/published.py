@@ -24,7 +24,7 @@ from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH
 from aqualog.model.tyre import Tyre
 from aqualog.physics.contact import contact_half_length, contact_share, friction_ratio, load_shift
 from aqualog.physics.hydroplaning import SPIN_UP_RATIO
-from aqualog.physics.water import film_drag, wave_drag
+from aqualog.physics.water import film_drag, skimming_share, wave_drag
 
 __all__ = [
     "CRITERIA", "MARKS", "QUANTITIES", "V_MOST", "Compared", "Condition", "Point", "compared", "contact", "drag",
@@ -232,9 +232,14 @@ def drag(tyre: Tyre, at: Condition, v: FloatArray) -> FloatArray:
 
     Source: `film_drag`, `wave_drag`, `load_shift`.
     """
-    wave = wave_drag(np.asarray(at.depth * 1e-3), v, width=tyre.width, h_wave=tyre.h_wave)
+    wave = wave_drag(np.asarray(at.depth * 1e-3), v, width=tyre.width, h_wave=tyre.h_wave) * _skims(tyre, at, v)
     force: FloatArray = 2.0 * (_wheel_force(tyre, at, v) + wave) / MASS
     return force
+
+
+def _skims(tyre: Tyre, at: Condition, v: FloatArray) -> FloatArray:
+    v_full = tyre.full_speed(np.asarray(at.depth * 1e-3), np.asarray(at.load), p=at.pressure * 1e5)
+    return skimming_share(v, v_full)
 
 
 def contact(tyre: Tyre, at: Condition, v: FloatArray) -> FloatArray:
@@ -247,11 +252,11 @@ def _wheel_force(tyre: Tyre, at: Condition, v: FloatArray) -> FloatArray:
     """What the water takes from the rotation of a wheel, as a force at its rim. [N] Rolls at `v`."""
     p, F_z, h_w = at.pressure * 1e5, np.asarray(at.load), np.asarray(at.depth * 1e-3)
     a = contact_half_length(F_z, p=p, a_ref=tyre.half_length, F_z_ref=F_Z_HALF_LENGTH, p_ref=P_HALF_LENGTH)
-    shift = load_shift(contact(tyre, at, v), a, peak=tyre.wedge_peak) * F_z / _car().r_l_f
+    shift = load_shift(contact(tyre, at, v), a, arm=tyre.wedge_arm) * F_z / _car().r_l_f
     film = film_drag(
         h_w, v, v, width=tyre.width, tread_capacity=tyre.tread_capacity, h_film=tyre.h_film, relief=tyre.groove_relief
     )
-    force: FloatArray = shift + film
+    force: FloatArray = shift + film * _skims(tyre, at, v)
     return force
 
 

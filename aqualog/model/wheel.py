@@ -29,12 +29,13 @@ from aqualog.model.road import (
     at_position,
 )
 from aqualog.model.state import ANGLE, AT, J_V, J_W, OMEGA, SLIP_X, SLIP_Y, V_X, V_Y, YAW_RATE
-from aqualog.model.tyre import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR
 from aqualog.physics import contact, hydroplaning, kinematics, rolling, slip, steering, surface, tyre_brush, water
-from aqualog.physics.hydroplaning import Anchor
+from aqualog.physics.hydroplaning import WaterLaw
 from aqualog.physics.resistance import rolling_resistance_force
 
-__all__ = ["Body", "Command", "Ground", "Now", "Place", "ground_under", "wheel"]
+__all__ = [
+    "Body", "Command", "Contact", "Ground", "Now", "Place", "even_full_speed", "ground_under", "water_at", "wheel",
+]  # fmt: skip
 
 _wheel_velocity = inlined(kinematics.wheel_velocity)
 _bounded_slip = inlined(slip.bounded_slip)
@@ -47,6 +48,7 @@ _load_shift = inlined(contact.load_shift)
 _v_full = inlined(hydroplaning.full_aquaplaning_speed)
 _film_drag = inlined(water.film_drag)
 _wave_drag = inlined(water.wave_drag)
+_skimming_share = inlined(water.skimming_share)
 _series_slope = inlined(surface.series_slope)
 _rolling_force = inlined(rolling_resistance_force)
 _aligning_moment = inlined(steering.aligning_moment)
@@ -119,7 +121,7 @@ class Ground(NamedTuple):
     noise: float
 
 
-class _Water(NamedTuple):
+class Contact(NamedTuple):
     """Remaining contact and friction [-], force of film and wave [N], torque of the load's shift, full speed."""
 
     contact: float
@@ -235,32 +237,43 @@ def _rolling(i, now, m, p, q):  # type: ignore[no-untyped-def]
 
 
 @part
-def _water(roll, ground, scatter, q):  # type: ignore[no-untyped-def]
-    """Return what the water does to the contact, and its resistance."""
-    film, F_z = ground.film, ground.F_z
-    if not film > 0.0:
-        return _Water(1.0, ground.mu, 0.0, 0.0, 0.0, 1e6)
-    v_full = _v_full(
-        film, F_z, q.p, q.tread_capacity, Anchor(q.v_anchor, H_ANCHOR, P_ANCHOR, F_Z_ANCHOR), q.h_bulk, q.h_onset,
-        q.contact_exponent,
-    )  # fmt: skip
+def even_full_speed(film, F_z, q):  # type: ignore[no-untyped-def]
+    """Return the speed of full aquaplaning of a rolling wheel with the numbers `q` in an even film [m] and load [N]."""
+    law = WaterLaw(q.v_anchor, q.pressure_exponent, q.thin_gain, q.h_bulk, q.h_onset, q.tread_gain, q.contact_exponent)
+    return _v_full(film, F_z, q.p, q.tread_depth, q.tread_capacity, 1.0, law)
+
+
+@part
+def water_at(film, F_z, v_even, along, rim, mu, q):  # type: ignore[no-untyped-def]
+    """Return what water does to the contact, and its resistance.
+
+    `v_even` [m/s]: full aquaplaning of a rolling wheel here; speeds [m/s] of the wheel's centre and of its rim.
+    """
     # a wheel that has slowed down floats down to a lower speed: Horne's spin-up speed
-    rolling_share = min(max(roll.rim / max(abs(roll.along), 0.5), 0.0), 1.0)
-    v_full *= _SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * rolling_share
-    v_full *= max(1.0 + scatter * q.contact_scatter * ground.noise, 0.2)
-    lost = _lost_contact(roll.along, v_full, q.contact_exponent) * q.contact_gain
+    rolling_share = min(max(rim / max(abs(along), 0.5), 0.0), 1.0)
+    v_full = v_even * (_SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * rolling_share)
+    lost = _lost_contact(along, v_full, q.contact_exponent) * q.contact_gain
     L = 1.0 - min(max(lost, 0.0), 1.0)
     half = _half_length(F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
-    shift = _load_shift(L, half, q.wedge_peak) * F_z
-    gain = q.water_drag_gain
-    ahead = max(roll.along, 0.0)
-    film_force = gain * _film_drag(film, ahead, roll.rim, q.width, q.tread_capacity, q.h_film, q.groove_relief)
-    skid = max(roll.along - roll.rim, 0.0)  # a slower tread pushes what it no longer throws
+    shift = _load_shift(L, half, q.wedge_arm) * F_z
+    ahead = max(along, 0.0)
+    gain = q.water_drag_gain * _skimming_share(ahead, v_full)
+    film_force = gain * _film_drag(film, ahead, rim, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+    skid = max(along - rim, 0.0)  # a slower tread pushes what it no longer throws
     wave = gain * (
         _wave_drag(film, ahead, q.width, q.h_wave)
         + _film_drag(film, ahead, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
     )
-    return _Water(L, ground.mu * q.wet_friction, film_force, wave, shift, v_full)
+    return Contact(L, mu * q.wet_friction, film_force, wave, shift, v_full)
+
+
+@part
+def _water(roll, ground, scatter, q):  # type: ignore[no-untyped-def]
+    if not ground.film > 0.0:
+        return Contact(1.0, ground.mu, 0.0, 0.0, 0.0, 1e6)
+    v_even = even_full_speed(ground.film, ground.F_z, q)
+    v_even *= max(1.0 + scatter * q.contact_scatter * ground.noise, 0.2)
+    return water_at(ground.film, ground.F_z, v_even, roll.along, roll.rim, ground.mu, q)
 
 
 @part

@@ -407,11 +407,11 @@ def test_starts_in_balance_on_a_hill_too():
 
 
 def test_water_holds_a_floating_car_back():
-    """A skidding tread still pushes the film: floating does not mean rolling on."""
+    """A skidding tread still pushes the film, less than at full aquaplaning: floating does not mean rolling on."""
     sc = scenario(speed=((0.0, 145 / 3.6),), lanes=(lane(3.0, 6.0, h=1.3e-3),), water_scatter=0.0, duration_s=6.0)
     t, c = truth(sc)
     late = t > 4.5
-    assert c["true_wave_drag"][late].mean() > 300.0
+    assert c["true_wave_drag"][late].mean() > 100.0
     assert c["a_x"][late].mean() < -0.3
 
 
