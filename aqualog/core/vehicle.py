@@ -20,17 +20,20 @@ __all__ = [
     "SOURCES",
     "SPLIT",
     "SPREAD",
+    "WATER",
     "Drivetrain",
     "Key",
     "Known",
     "Provenance",
     "Source",
     "Vehicle",
+    "WaterNumber",
     "known_lines",
     "provenance_lines",
     "spread_lines",
     "usual",
     "vehicle_toml",
+    "water_lines",
 ]
 
 Drivetrain = Literal["rwd", "fwd", "awd"]
@@ -105,6 +108,11 @@ SOURCES: Mapping[Source, str] = {
 SPLIT: Mapping[str, float] = {"rwd": 1.0, "fwd": 0.0, "awd": 0.5}
 """Rear share of the drive torque where a file does not set it."""
 
+WATER: Mapping[str, str] = {
+    "v_anchor": "m/s", "contact_exponent": "-",
+}  # fmt: skip
+"""Numbers of the law of water that this car's passes can show, with units; they are keys of a tyre in the simulator."""
+
 COEFFICIENTS = ("c0", "c_y", "c_x", "sigma")
 
 KEYS: dict[str, Key] = {k.path: k for k in _ALL}
@@ -131,12 +139,22 @@ class Known:
 
 
 @dataclass(frozen=True, slots=True)
+class WaterNumber:
+    """A number of the law of water, its standard deviation in the same unit (0: exact), and where it comes from."""
+
+    value: float
+    sd: float = 0.0
+    source: Source = "calibrated"
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """One vehicle, SI.
 
     `given` are the keys that the user's file sets; a detector that needs a key which is not given says so instead of
     trusting a default. `provenance` is what the file says of its values; `core.provenance` knows the rest.
-    `known`: faults by effect and place, as `signal_delay@torque`.
+    `known`: faults by effect and place, as `signal_delay@torque`. `water`: numbers of the law of water by the names of
+    `WATER`, for the tyres on this car.
     """
 
     name: str = "default car"
@@ -166,6 +184,7 @@ class Vehicle:
     spread: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Provenance] = field(default_factory=dict)
     known: Mapping[str, Known] = field(default_factory=dict)
+    water: Mapping[str, WaterNumber] = field(default_factory=dict)
     given: frozenset[str] = frozenset()
 
     @classmethod
@@ -246,6 +265,16 @@ def known_lines(vehicle: Vehicle) -> list[str]:
     ]
 
 
+def water_lines(vehicle: Vehicle) -> list[str]:
+    """The lines of the table `water` in a vehicle file."""
+    said = ((n, unit, vehicle.water[n]) for n, unit in WATER.items() if n in vehicle.water)
+    return [
+        f'{n} = {{ value = {w.value!r}, sd = {w.sd!r}, source = "{w.source}" }}  # [{unit}] 95 %: '
+        f"{w.value - 1.96 * w.sd:.5g} ... {w.value + 1.96 * w.sd:.5g}"
+        for n, unit, w in said
+    ]
+
+
 def usual(vehicle: Vehicle, key: Key) -> float:
     """The value that a key has where a file does not set it.
 
@@ -283,6 +312,8 @@ def vehicle_toml(vehicle: Vehicle) -> str:
         lines += ["", "[provenance]", *provenance_lines(vehicle)]
     if vehicle.known:
         lines += ["", "[known]", *known_lines(vehicle)]
+    if vehicle.water:
+        lines += ["", "[water]", *water_lines(vehicle)]
     for section in POLYNOMIALS:
         table = getattr(vehicle, section)
         if table:
