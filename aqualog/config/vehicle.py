@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 from aqualog.config.reader import Table, is_real, quoted, read
 from aqualog.core.errors import ConfigError
@@ -19,8 +19,10 @@ from aqualog.core.vehicle import (
     WATER,
     Known,
     Provenance,
+    TorqueArm,
     Vehicle,
     WaterNumber,
+    arm_lines,
     known_lines,
     provenance_lines,
     spread_lines,
@@ -43,7 +45,7 @@ TYPICAL_FORCE = 1000.0  # [N] at which a higher power may give as much as the fi
 
 _SECTIONS = tuple(dict.fromkeys(k.section for k in KEYS.values() if k.section))
 _TABLES = (*_SECTIONS, *POLYNOMIALS, "spread", "provenance", "known", "water")
-_TABLES_AND_WORDS = ("name", "drivetrain", *_TABLES)
+_TABLES_AND_WORDS = ("name", "drivetrain", "torque_arm", *_TABLES)
 
 
 def load_vehicle(path: Path) -> Vehicle:
@@ -62,6 +64,7 @@ def load_vehicle(path: Path) -> Vehicle:
         file.add("name", f"name = {values['name']!r:.60} is not one line of printable characters")
     given = {"name", *(n for n in ("drivetrain",) if n in file)}
     values["drivetrain"] = file.choice("drivetrain", SPLIT, "rwd")
+    values["torque_arm"] = file.choice("torque_arm", get_args(TorqueArm), "effective")
     for section in POLYNOMIALS:
         values[section] = _polynomial(file.table(section), section)
     values["spread"] = file.table("spread").numbers({n: _Deviation(KEYS[n].high, KEYS[n].unit) for n in SPREAD})
@@ -231,7 +234,7 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     values = identified_values(calibration.parameters, vehicle)
     name = new.name.replace("\\", "").replace('"', "")
     drives = ", ".join(_plain(d.name) for d in calibration.drives)
-    lines = [f"# calibrated from {drives}", f'name = "{name}"', _drivetrain(new)]
+    lines = [f"# calibrated from {drives}", f'name = "{name}"', _drivetrain(new), *arm_lines(new)]
     section = ""
     for key in KEYS.values():
         if key.section != section:

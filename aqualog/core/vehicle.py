@@ -26,8 +26,10 @@ __all__ = [
     "Known",
     "Provenance",
     "Source",
+    "TorqueArm",
     "Vehicle",
     "WaterNumber",
+    "arm_lines",
     "known_lines",
     "provenance_lines",
     "spread_lines",
@@ -37,6 +39,7 @@ __all__ = [
 ]
 
 Drivetrain = Literal["rwd", "fwd", "awd"]
+TorqueArm = Literal["effective", "loaded"]
 Source = Literal["measured", "calibrated", "data_sheet", "guess"]
 
 
@@ -159,6 +162,7 @@ class Vehicle:
 
     name: str = "default car"
     drivetrain: Drivetrain = "rwd"
+    torque_arm: TorqueArm = "effective"
     mass: float = _default("mass")
     l_f: float = _default("l_f")
     l_r: float = _default("l_r")
@@ -208,6 +212,13 @@ class Vehicle:
         """Loaded radius of a wheel. [m]"""
         return self.r_l_f if wheel[0] == "f" else self.r_l_r
 
+    def arm(self, wheel: str) -> float:
+        """Lever of a wheel's torque over its force: r_e, or r_l as Eq. (2.10) is printed, by `torque_arm`. [m]
+
+        A wheel without slip loss that rolls on r_e gives T / r_e, since the power is the same (E24).
+        """
+        return self.r_e(wheel) if self.torque_arm == "effective" else self.r_l(wheel)
+
     def inertia(self, wheel: str) -> float:
         """Inertia of a wheel about its axis. [kg·m²]"""
         return self.inertia_f if wheel[0] == "f" else self.inertia_r
@@ -240,6 +251,11 @@ class Vehicle:
         printed: front minus rear).
         """
         return "r" if self.drivetrain == "fwd" else "f"
+
+
+def arm_lines(vehicle: Vehicle) -> list[str]:
+    """The line of the torque's lever in a vehicle file; none for the usual one."""
+    return [] if vehicle.torque_arm == "effective" else [f'torque_arm = "{vehicle.torque_arm}"']
 
 
 def spread_lines(vehicle: Vehicle) -> list[str]:
@@ -297,7 +313,7 @@ def vehicle_toml(vehicle: Vehicle) -> str:
     name = vehicle.name.replace("\\", "").replace('"', "")
     is_from_file = "name" in vehicle.given
     hidden = "# " if is_from_file and not vehicle.knows_drivetrain and vehicle.drivetrain == "rwd" else ""
-    lines = [f'name = "{name}"', f'{hidden}drivetrain = "{vehicle.drivetrain}"']
+    lines = [f'name = "{name}"', f'{hidden}drivetrain = "{vehicle.drivetrain}"', *arm_lines(vehicle)]
     section = ""
     for key in KEYS.values():
         if key.section != section:

@@ -45,7 +45,7 @@ def even_slip(
     ----------
     tyre : Tyre
     vehicle : Vehicle
-        Slip slope, friction, rolling resistance and loaded radius of the front axle.
+        Slip slope, friction, rolling resistance and effective radius of the front axle.
     v, h_w, F_z : array (n,)
         Speed [m/s], water [m], wheel load [N].
     p : float
@@ -90,7 +90,7 @@ def _balance(
     film = film_drag(
         h_w, v, rim, width=tyre.width, tread_capacity=tyre.tread_capacity, h_film=tyre.h_film, relief=tyre.groove_relief
     )
-    shift = load_shift(L, a, arm=tyre.wedge_arm) * F_z / vehicle.r_l_f
+    shift = load_shift(L, a, arm=tyre.wedge_arm) * F_z / vehicle.r_e_f
     resistance = film * skimming_share(v, floats) + shift + vehicle.rolling_resistance * F_z
     left: FloatArray = force[None, :, None] - per_load * F_z - resistance
     return left

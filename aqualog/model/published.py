@@ -252,7 +252,7 @@ def _wheel_force(tyre: Tyre, at: Condition, v: FloatArray) -> FloatArray:
     """What the water takes from the rotation of a wheel, as a force at its rim. [N] Rolls at `v`."""
     p, F_z, h_w = at.pressure * 1e5, np.asarray(at.load), np.asarray(at.depth * 1e-3)
     a = contact_half_length(F_z, p=p, a_ref=tyre.half_length, F_z_ref=F_Z_HALF_LENGTH, p_ref=P_HALF_LENGTH)
-    shift = load_shift(contact(tyre, at, v), a, arm=tyre.wedge_arm) * F_z / _car().r_l_f
+    shift = load_shift(contact(tyre, at, v), a, arm=tyre.wedge_arm) * F_z / _car().r_e_f
     film = film_drag(
         h_w, v, v, width=tyre.width, tread_capacity=tyre.tread_capacity, h_film=tyre.h_film, relief=tyre.groove_relief
     )

@@ -102,7 +102,6 @@ class _Rolling(NamedTuple):
     along: float
     across: float
     r_e: float
-    r_l: float
     rim: float
 
 
@@ -203,7 +202,7 @@ def wheel(i, now, ground, command, m, p, q):  # type: ignore[no-untyped-def]
     F_x, F_y = _brush_forces(slips.s_x, slips.s_y, ground.F_z, wet.mu, stiff.C_x, stiff.C_y, wet.contact)
     balance = _balance(i, roll, ground, wet, command, m, p, q)
     m.f[OMEGA + i] = (
-        balance.torque - F_x * roll.r_l - (balance.resisting + balance.braking) * balance.turn + ground.bump
+        balance.torque - F_x * roll.r_e - (balance.resisting + balance.braking) * balance.turn + ground.bump
     ) / q.inertia
     m.f[ANGLE + i] = roll.omega
     _jacobian(i, m, F_x, roll, slips, stiff, wet.contact, balance, p, q.inertia)
@@ -231,9 +230,8 @@ def _rolling(i, now, m, p, q):  # type: ignore[no-untyped-def]
     angle = now.steer if front else 0.0
     along, across = _wheel_velocity(m.y[V_X], m.y[V_Y], m.y[YAW_RATE], angle, x, side)
     r_e = _effective_radius(q.r_e, along, q.radius_growth) * (1.0 - q.leak_radius * now.leak)
-    r_l = q.r_l * (1.0 - q.leak_radius * now.leak)
     omega = m.y[OMEGA + i]
-    return _Rolling(x, side, omega, along, across, r_e, r_l, omega * r_e)
+    return _Rolling(x, side, omega, along, across, r_e, omega * r_e)
 
 
 @part
@@ -310,11 +308,11 @@ def _slip(i, m, roll, sigma):  # type: ignore[no-untyped-def]
 def _balance(i, roll, ground, wet, command, m, p, q):  # type: ignore[no-untyped-def]
     front = i < 2
     share = 1.0 - command.split_rear if front else command.split_rear
-    torque = 0.5 * share * command.drive + (0.5 if front else -0.5) * command.excitation * roll.r_l
+    torque = 0.5 * share * command.drive + (0.5 if front else -0.5) * command.excitation * roll.r_e
     torque += m.applied[i] * p.torque_gain
     braking = q.brake_split * command.brake * (1.0 - m.released[i])
-    water_torque = wet.film_force * roll.r_l + wet.shift
-    resisting = _rolling_force(ground.F_z, ground.r_w) * roll.r_l + water_torque + q.brake_drag
+    water_torque = wet.film_force * roll.r_e + wet.shift
+    resisting = _rolling_force(ground.F_z, ground.r_w) * roll.r_e + water_torque + q.brake_drag
     # resistance fades out near standstill instead of jumping, over what one step of it can change
     standstill = max(1.0, p.dt * (resisting + braking) / q.inertia)
     turn = min(max(roll.omega / standstill, -1.0), 1.0)
@@ -326,7 +324,7 @@ def _jacobian(i, m, F_x, roll, slips, stiff, L, balance, p, inertia):  # type: i
     # the secant, not the tangent: a sliding tyre must be damped too where one step would carry it past sticking
     dF_dsx = abs(F_x) / abs(slips.s_x) if abs(slips.s_x) > 1e-9 else stiff.C_x * _stiffness_ratio(L)
     jac = m.jac
-    arm = roll.r_l / inertia
+    arm = roll.r_e / inertia
     jac[OMEGA + i] = -dF_dsx * slips.by_omega * arm
     jac[J_W + i] = -dF_dsx * slips.by_v * arm
     jac[J_V + i] = dF_dsx * slips.by_omega / p.mass

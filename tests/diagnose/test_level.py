@@ -62,7 +62,7 @@ def test_steady_expectation_is_where_the_simulation_settles(model):
     )
     wheels = ("fl", "fr", "rl", "rr")
     mu = np.stack([
-        traction_coefficient(last[f"torque_{w}"], F_z[i], np.zeros(1), r_l=SEDAN.r_l(w), inertia=SEDAN.inertia(w),
+        traction_coefficient(last[f"torque_{w}"], F_z[i], np.zeros(1), arm=SEDAN.arm(w), inertia=SEDAN.inertia(w),
                              r_w=SEDAN.rolling_resistance)
         for i, w in enumerate(wheels)
     ])  # fmt: skip
@@ -74,7 +74,7 @@ def test_steady_expectation_is_where_the_simulation_settles(model):
         # the record's slip is over v_x, the expectation's over the rim
         s = last[f"true_slip_{w}"][0]
         assert found.slip[i, 0] == pytest.approx(s / (1.0 + s), rel=0.02)
-    water = sum(last[f"true_water_torque_{w}"][0] / SEDAN.r_l(w) for w in wheels) + last["true_wave_drag"][0]
+    water = sum(last[f"true_water_torque_{w}"][0] / SEDAN.arm(w) for w in wheels) + last["true_wave_drag"][0]
     assert found.resistance[0] == pytest.approx(water / plant.mass, rel=0.01)
 
 

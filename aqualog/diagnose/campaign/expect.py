@@ -144,7 +144,7 @@ def _respond(v, a, traction, which, wet, cars, wheels, lanes, points, table):  #
                     for _ in range(2):  # a wheel that has slowed down floats sooner, and slips more
                         wet_now = water_at(film, F_z, v_even, v[m], v[m] / (1.0 - s), q.mu, q)
                         L = wet_now.contact
-                        drag = wet_now.film_force + wet_now.shift / q.r_l
+                        drag = wet_now.film_force + wet_now.shift / q.r_e
                         # the torque that the water takes at the wheel never reaches the road
                         found = _slip(traction[i, m] - drag / F_z, F_z, L, wet_now.mu, q, table)
                         carries = abs(found) < S_MAX
