@@ -146,9 +146,8 @@ def _of_wheel(c: _Course, dry: BoolArray, usable: BoolArray, vehicle: Vehicle, h
     F_z = 0.5 * vehicle.mass * G * vehicle.l_r / vehicle.wheelbase
     # slip by the rim's speed; a wheel that stands counts as turning at a twentieth
     rim = np.maximum(c.omega / ratio, 0.05 * np.maximum(c.v, 1.0))
-    demand_dry = (
-        float(np.nanmedian(c.torque[dry])) / vehicle.arm("fl") / F_z if np.isfinite(c.torque[dry]).any() else 0.0
-    )
+    is_driven = bool(np.isfinite(c.torque[dry]).any())
+    demand_dry = float(np.nanmedian(c.torque[dry])) / vehicle.arm("fl") / F_z if is_driven else 0.0
     dry_slip = (demand_dry - vehicle.rolling_resistance) / front_slip_slope(Tyre(), vehicle, p)
     slip = 1.0 - c.v / rim + dry_slip
     dt = float(c.t[1] - c.t[0])
@@ -165,8 +164,8 @@ def _of_wheel(c: _Course, dry: BoolArray, usable: BoolArray, vehicle: Vehicle, h
         speed = float(c.v[own[away][0]]) if lost else float(np.median(c.v[own]))
         if speed < LEAST_V or (not lost and start < c.t[at[0]] + SETTLES_S):
             continue
-        is_driven = bool(np.isfinite(c.torque[own]).any())
-        demand = float(np.nanmedian(c.torque[own])) / vehicle.arm("fl") / F_z if is_driven else math.nan
+        known = bool(np.isfinite(c.torque[own]).any())
+        demand = float(np.nanmedian(c.torque[own])) / vehicle.arm("fl") / F_z if known else math.nan
         a = float(np.polyfit(c.t[own], c.v[own], 1)[0])
         windows.append(Window(speed, h_w, F_z, demand, float(np.median(slip[own])), lost, a))
         if lost:
