@@ -36,6 +36,7 @@ _SLIP_SD = 0.0008  # [-] of a window's slip: sensors and the dry ratio
 _LATE_S = 0.1  # [s] by which the velocity may be late (K)
 _RELATIVE_SD = 0.10  # of a window's slip: the wheel's load and the film (K)
 _OUTLIER = 1e-3  # likelihood of a window that no numbers explain
+_EVEN_SD = (0.008, 0.06)  # of the logarithms: the balance is on even water, the road is not (`water_study`, D)
 _WIDE = {"v_anchor": 0.10, "contact_exponent": 0.5}
 """Half of an interval over its value beyond which a number is not identified."""
 
@@ -156,7 +157,7 @@ def fit_water(passes: Sequence[WetPass], vehicle: Vehicle, tyre: Tyre, *, p: flo
     The slip of a front wheel on even water follows from the balance of its torques (`even_slip`). A window's speed of
     full aquaplaning scatters about the law's; the likelihood is the mean over that. Estimates are means of the
     posterior over a grid, flat in the logarithms. Intervals: the larger of its standard deviation and that of a
-    jackknife over passes, with Student's t. The slip slope of the vehicle file is taken as exact.
+    jackknife over passes, with Student's t, and on top of it what an uneven road does to the balance. The slip slope of the vehicle file is taken as exact.
 
     Source: the balance of `model/wheel.py`; jackknife as in `calibrate`.
     """
@@ -180,7 +181,7 @@ def fit_water(passes: Sequence[WetPass], vehicle: Vehicle, tyre: Tyre, *, p: flo
     left = np.array([_posterior(own.sum(axis=0) - one)[0] for one in own])
     n = len(used)
     jack = np.sqrt((n - 1.0) / n * ((left - left.mean(axis=0)) ** 2).sum(axis=0))
-    half = student_quantile(0.975, n - 1.0) * np.maximum(sd, jack)
+    half = np.hypot(student_quantile(0.975, n - 1.0) * np.maximum(sd, jack), 1.96 * np.array(_EVEN_SD))
     edges = _at_edges(own.sum(axis=0))
     logs = whole + np.log([tyre.v_anchor, 1.0])
     parameters = tuple(
