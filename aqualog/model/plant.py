@@ -76,6 +76,7 @@ class Plant(NamedTuple):
     h_wave: FloatArray
     water_drag_gain: FloatArray
     h_track: FloatArray
+    track_irregularity: FloatArray
     contact_scatter: FloatArray
     towed_mass: float  # [kg] of a trailer: pulled along, carried by its own wheels
     leak_start: float  # [s] a tyre loses its air from here on
@@ -98,7 +99,7 @@ _OF_CAR = ("mass", "l_f", "l_r", "h_cg", "track", "drag_area", "air_density")
 _OF_TYRES = (
     "load_sensitivity", "wet_friction", "tread_depth", "tread_capacity", "half_length", "width", "v_anchor",
     "pressure_exponent", "thin_gain", "h_bulk", "h_onset", "tread_gain", "contact_exponent", "wedge_arm",
-    "h_film", "groove_relief", "h_wave", "h_track", "contact_scatter",
+    "h_film", "groove_relief", "h_wave", "h_track", "track_irregularity", "contact_scatter",
 )  # fmt: skip
 _ADDED = ("head_wind", "cornering_drag", "warmup_extra", "towed_mass", "leak_start")
 _ADDED_AT_WHEELS = ("radius_growth", "brake_drag", "slip_slope_drift", "relaxation_length", "leak_radius", "leak_slope")

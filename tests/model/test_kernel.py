@@ -242,9 +242,18 @@ def test_rear_wheels_run_in_the_tracks_of_the_front_wheels():
     )
     t, c = truth(sc)
     assert c["true_film_fl"].max() == pytest.approx(1.3e-3, rel=0.3)
-    assert c["true_film_rl"].max() == pytest.approx(TYRES["worn_summer"].h_track, rel=1e-3)
+    h_track, rear = TYRES["worn_summer"].h_track, c["true_film_rl"]
+    assert rear[rear > 0.0] == pytest.approx(h_track * (1.0 - np.exp(-1.3e-3 / h_track)), rel=1e-3)
     front, rear = t[c["true_film_fl"] > 0][0], t[c["true_film_rl"] > 0][0]
     assert rear - front == pytest.approx(SEDAN.wheelbase / 20.0, abs=0.01)
+
+
+def test_the_film_in_a_track_has_its_own_roughness():
+    even = lane(2.0, 14.0, irregularity_left=0.0, irregularity_right=0.0)
+    _, c = truth(scenario(speed=((0.0, 20.0),), lanes=(even,), duration_s=14.0))
+    left, right = (c[f"true_film_r{s}"][4000:] for s in "lr")
+    assert left.std() / left.mean() == pytest.approx(TYRES["worn_summer"].track_irregularity, rel=0.3)
+    assert abs(np.corrcoef(left, right)[0, 1]) < 0.4
 
 
 def test_lane_in_metres_starts_where_it_says():
