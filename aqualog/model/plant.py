@@ -45,6 +45,7 @@ class Plant(NamedTuple):
     r_l: FloatArray
     radius_growth: FloatArray
     inertia: FloatArray
+    driveline: FloatArray  # [kg·m²] turns with the mean of both wheels of an axle
     r_w: FloatArray
     warmup_extra: float
     warmup_time: float
@@ -128,7 +129,9 @@ def build_plant(
         return np.array([float(getattr(t, name)) for t in tyres])
 
     as_they_are: dict[str, Any] = {name: getattr(vehicle, name) for name in _OF_CAR}
-    as_they_are |= {name: np.array([getattr(vehicle, name)(w) for w in WHEELS]) for name in ("r_e", "r_l", "inertia")}
+    as_they_are |= {
+        name: np.array([getattr(vehicle, name)(w) for w in WHEELS]) for name in ("r_e", "r_l", "inertia", "driveline")
+    }
     as_they_are |= {name: of(name) for name in _OF_TYRES}
     nothing: dict[str, Any] = dict.fromkeys(_ADDED, 0.0) | {name: np.zeros(4) for name in _ADDED_AT_WHEELS}
     return Plant(

@@ -69,6 +69,30 @@ def test_radii_3_percent_apart_are_no_resistance(car):
     assert resistance(t, c, scenario(printed))[steady].mean() == pytest.approx((1 / 0.97 - 1) * 2.6, abs=0.01)
 
 
+@pytest.mark.parametrize("car", CARS)
+def test_what_the_driveline_takes_is_no_resistance(car):
+    heavy = replace(CARS[car], driveline_inertia=4.0)
+    t, c = truth(scenario(heavy, speed=RAMP))
+    assert np.abs(resistance(t, c, scenario(heavy))[5:-5]).max() < 0.01
+    assert np.abs(resistance(t, c, scenario(CARS[car]))[(t > 5.0) & (t < 15.0)].mean()) > 0.015
+
+
+def test_a_driveline_slows_both_wheels_of_an_axle_down_and_one_alone_by_half():
+    """By hand: both by I + J / 2; one alone by I + J / 4 less what the other, which turns back, gives."""
+    f = np.zeros(state.N_STATES)
+    wheels = np.zeros(4, dtype=[("inertia", float), ("driveline", float)])
+    wheels["inertia"], wheels["driveline"] = 1.2, [0.0, 0.0, 4.0, 4.0]
+    f[state.OMEGA : state.OMEGA + 4] = 10.0
+    kernel._turn_driveline(f, wheels)
+    assert f[state.OMEGA : state.OMEGA + 4] == pytest.approx([10.0, 10.0, 10.0 * 1.2 / 3.2, 10.0 * 1.2 / 3.2])
+    f[state.OMEGA + 2 : state.OMEGA + 4] = 10.0, 0.0
+    kernel._turn_driveline(f, wheels)
+    one, other = f[state.OMEGA + 2], f[state.OMEGA + 3]
+    assert other < 0.0 < one
+    assert 1.2 * one + (one + other) == pytest.approx(12.0)  # torque on the left wheel: itself and a quarter of J
+    assert 1.2 * other + (one + other) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_dry_resistance_measure_does_not_see_a_grade():
     t, c = truth(scenario(grade=((0.0, 0.0), (100.0, 0.04), (300.0, -0.03))))
     assert np.abs(resistance(t, c, scenario())[5:-5]).max() < 0.01
