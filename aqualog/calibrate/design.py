@@ -174,7 +174,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     spinning = np.zeros_like(v)  # the part of the torque that spins the wheels (E5); else they follow the car
     for w in WHEELS:
         omega = columns[f"omega_{w}"] if f"omega_{w}" in columns else v / vehicle.r_e(w)
-        spinning = spinning + vehicle.inertia(w) * np.gradient(omega, dt) / vehicle.arm(w)
+        spinning = spinning + vehicle.turning_inertia(w) * np.gradient(omega, dt) / vehicle.arm(w)
     force = earlier(torque, torque_lag, dt) - spinning
     reason = _reasons(a_x, v, force, columns, features, vehicle, dt)
     used = reason == 0

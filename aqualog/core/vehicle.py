@@ -75,6 +75,10 @@ _ALL = [
     Key("", "rolling_resistance", "-", 0.0105, 0.0, 0.1, "coefficient r_w, dry", "0.007-0.017 (V, [trb2006])"),
     Key("", "torque_split_rear", "-", 0.5, 0.0, 1.0, "rear share of drive torque", "1 rwd, 0 fwd, 0.5 awd"),
     Key("", "torque_gain", "-", 1.0, 0.1, 100.0, "torque at the wheels over the one that the log says", "none"),
+    Key(
+        "", "driveline_inertia", "kg*m^2", 0.0, 0.0, 100.0, "engine or motor and gears, at the driven wheels",
+        "0: torque at the half shafts; engine 1-3, electric axle 3-6 (K)",
+    ),
     Key("", "steering_ratio", "-", 15.0, 5.0, 40.0, "steering wheel angle over road-wheel angle", _MID),
     Key("wheels", "r_e_f", "m", 0.317, 0.1, 1.0, "effective rolling radius, front", "205/55R16 (D)"),
     Key("wheels", "r_e_r", "m", 0.317, 0.1, 1.0, "effective rolling radius, rear", "205/55R16 (D)"),
@@ -173,6 +177,7 @@ class Vehicle:
     rolling_resistance: float = _default("rolling_resistance")
     torque_split_rear: float = 1.0
     torque_gain: float = _default("torque_gain")
+    driveline_inertia: float = _default("driveline_inertia")
     steering_ratio: float = _default("steering_ratio")
     r_e_f: float = _default("wheels.r_e_f")
     r_e_r: float = _default("wheels.r_e_r")
@@ -220,8 +225,16 @@ class Vehicle:
         return self.r_e(wheel) if self.torque_arm == "effective" else self.r_l(wheel)
 
     def inertia(self, wheel: str) -> float:
-        """Inertia of a wheel about its axis. [kg·m²]"""
+        """Inertia of a wheel about its axis, without the driveline. [kg·m²]"""
         return self.inertia_f if wheel[0] == "f" else self.inertia_r
+
+    def driveline(self, wheel: str) -> float:
+        """Inertia of the driveline that turns with the mean of this wheel and the other of its axle. [kg·m²]"""
+        return self.driveline_inertia * (self.torque_split_rear if wheel[0] == "r" else 1.0 - self.torque_split_rear)
+
+    def turning_inertia(self, wheel: str) -> float:
+        """Inertia that the torque of a wheel turns where both wheels of its axle turn alike. [kg·m²]"""
+        return self.inertia(wheel) + 0.5 * self.driveline(wheel)
 
     @property
     def wheelbase(self) -> float:

@@ -67,7 +67,7 @@ class FeatureStream:
         self._weights = np.array([trust if w in vehicle.driven else 1.0 for w in WHEELS])
         self._r_e = np.array([vehicle.r_e(w) for w in WHEELS])
         self._arm = np.array([vehicle.arm(w) for w in WHEELS])
-        self._inertia = np.array([vehicle.inertia(w) for w in WHEELS])
+        self._inertia = np.array([vehicle.turning_inertia(w) for w in WHEELS])
         self._steering = SteeringModel(vehicle, dt, self.available)
 
     def push(self, columns: Mapping[str, FloatArray]) -> Features:

@@ -235,7 +235,8 @@ def _two_accelerations() -> Scenario:
     60 % of the torque go to the front axle.
     """
     speed: Profile = (
-        (0.0, 113 * KMH), (18.6, 113 * KMH), (19.1, 116 * KMH), (20.8, 116 * KMH), (22.6, 110 * KMH), (25.0, 129 * KMH), (28.0, 129 * KMH)
+        (0.0, 113 * KMH), (18.6, 113 * KMH), (19.1, 116 * KMH), (20.8, 116 * KMH), (22.6, 110 * KMH),
+        (25.0, 129 * KMH), (28.0, 129 * KMH),
     )  # fmt: skip
     lane = Lane(17.5, 24.5, depth_left=1.3e-3, depth_right=1.3e-3)
     return _drive(SUV, speed, (lane,), 28.0, 5, split_rear=((0.0, 0.4),))

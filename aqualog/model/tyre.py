@@ -74,7 +74,11 @@ class Tyre:
         "m", 1.3e-3, 0.0, 0.05, "depth from which water is pushed ahead", "resistance rises between 1.3 and 2 mm (D)"
     )  # fmt: skip
     h_track: float = _of(
-        "m", 0.5e-3, 0.0, 0.01, "film that a front wheel leaves", "below the least depth tested, 0.6 mm (D)"
+        "m", 0.5e-3, 1e-6, 0.01, "film that a front wheel leaves of deep water",
+        "below the least depth tested, 0.6 mm (D)",
+    )  # fmt: skip
+    track_irregularity: float = _of(
+        "-", 0.3, 0.0, 2.0, "rms of that film along the road, relative", "splash and tread pattern (K)"
     )  # fmt: skip
     contact_scatter: float = _of(
         "-", 0.06, 0.0, 0.5, "rms of v_full along the road, relative", "wheel load and texture (K)"

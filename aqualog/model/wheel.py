@@ -26,6 +26,7 @@ from aqualog.model.road import (
     ROLLING,
     ROUGHNESS,
     SURFACE_WIDTH,
+    TRACK,
     at_position,
 )
 from aqualog.model.state import ANGLE, AT, J_V, J_W, OMEGA, SLIP_X, SLIP_Y, V_X, V_Y, YAW_RATE
@@ -180,7 +181,8 @@ def ground_under(i, warm, F_z, place, p, q, lanes, fields, track):  # type: igno
             uneven = 1.0 + lanes[lane, IRREGULARITY_LEFT + side] * at_position(fields, DEPTH + side, place.way, p.ds)
             film = lanes[lane, DEPTH_LEFT + side] * max(uneven, 0.0)
         else:
-            film = track[place.behind, 1 + side]
+            uneven = 1.0 + p.scatter * q.track_irregularity * at_position(fields, TRACK + side, place.way, p.ds)
+            film = track[place.behind, 1 + side] * max(uneven, 0.0)
     if p.kicks > 0.0:
         bump += at_position(fields, KICK_TORQUE + side, place.way, p.ds)
         F_z = max(F_z + at_position(fields, KICK_LOAD + side, place.way, p.ds), 0.0)

@@ -140,19 +140,20 @@ def residual_film(h_w: FloatArray, L_front: FloatArray, *, h_track: float) -> Fl
     L_front : array
         Remaining contact share of the front wheel, 0 ... 1. [-]
     h_track : float
-        Film that a wheel with full contact leaves. [m]
+        Film that a wheel with full contact leaves of deep water. [m]
 
     Returns
     -------
     h : array
-        min(h, h_track) + (h - h_track)+ (1 - L)^6. [m]
+        k + (h - k) (1 - L)^6 with k = h_track (1 - exp(-h / h_track)). [m]
 
-    Where the rear part of the patch touches the road, the water has been squeezed out: as long as the front wheel keeps
-    some contact, the film does not depend on the depth (thesis 2.3 on Fig. 2.17). Only a wheel that floats clears
-    nothing; the sixth power makes the passage, over the last third of the contact, smooth. Limits: L = 1 leaves
-    min(h, h_track), L = 0 leaves h.
+    A wheel squeezes out a share that grows with the depth: much of 2 mm, little of 0.2 mm, which lies in texture and
+    grooves. As long as it keeps some contact, the film depends little on the depth (thesis 2.3 on Fig. 2.17). A wheel
+    that floats clears nothing; the sixth power makes the passage, over the last third of the contact, smooth. Limits:
+    L = 0 leaves h; L = 1 leaves h of a thin film, and h_track of deep water.
 
     Source: an assumption in shape, after Fig. 2.17 of [fichtinger2024] (C50).
     """
     lost = 1.0 - np.minimum(np.maximum(L_front, 0.0), 1.0)
-    return np.minimum(h_w, h_track) + np.maximum(h_w - h_track, 0.0) * lost**6
+    kept = h_track * (1.0 - np.exp(-h_w / h_track))
+    return kept + (h_w - kept) * lost**6

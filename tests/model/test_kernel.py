@@ -69,6 +69,30 @@ def test_radii_3_percent_apart_are_no_resistance(car):
     assert resistance(t, c, scenario(printed))[steady].mean() == pytest.approx((1 / 0.97 - 1) * 2.6, abs=0.01)
 
 
+@pytest.mark.parametrize("car", CARS)
+def test_what_the_driveline_takes_is_no_resistance(car):
+    heavy = replace(CARS[car], driveline_inertia=4.0)
+    t, c = truth(scenario(heavy, speed=RAMP))
+    assert np.abs(resistance(t, c, scenario(heavy))[5:-5]).max() < 0.01
+    assert np.abs(resistance(t, c, scenario(CARS[car]))[(t > 5.0) & (t < 15.0)].mean()) > 0.015
+
+
+def test_a_driveline_slows_both_wheels_of_an_axle_down_and_one_alone_by_half():
+    """By hand: both by I + J / 2; one alone by I + J / 4 less what the other, which turns back, gives."""
+    f = np.zeros(state.N_STATES)
+    wheels = np.zeros(4, dtype=[("inertia", float), ("driveline", float)])
+    wheels["inertia"], wheels["driveline"] = 1.2, [0.0, 0.0, 4.0, 4.0]
+    f[state.OMEGA : state.OMEGA + 4] = 10.0
+    kernel._turn_driveline(f, wheels)
+    assert f[state.OMEGA : state.OMEGA + 4] == pytest.approx([10.0, 10.0, 10.0 * 1.2 / 3.2, 10.0 * 1.2 / 3.2])
+    f[state.OMEGA + 2 : state.OMEGA + 4] = 10.0, 0.0
+    kernel._turn_driveline(f, wheels)
+    one, other = f[state.OMEGA + 2], f[state.OMEGA + 3]
+    assert other < 0.0 < one
+    assert 1.2 * one + (one + other) == pytest.approx(12.0)  # torque on the left wheel: itself and a quarter of J
+    assert 1.2 * other + (one + other) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_dry_resistance_measure_does_not_see_a_grade():
     t, c = truth(scenario(grade=((0.0, 0.0), (100.0, 0.04), (300.0, -0.03))))
     assert np.abs(resistance(t, c, scenario())[5:-5]).max() < 0.01
@@ -242,9 +266,18 @@ def test_rear_wheels_run_in_the_tracks_of_the_front_wheels():
     )
     t, c = truth(sc)
     assert c["true_film_fl"].max() == pytest.approx(1.3e-3, rel=0.3)
-    assert c["true_film_rl"].max() == pytest.approx(TYRES["worn_summer"].h_track, rel=1e-3)
+    h_track, rear = TYRES["worn_summer"].h_track, c["true_film_rl"]
+    assert rear[rear > 0.0] == pytest.approx(h_track * (1.0 - np.exp(-1.3e-3 / h_track)), rel=1e-3)
     front, rear = t[c["true_film_fl"] > 0][0], t[c["true_film_rl"] > 0][0]
     assert rear - front == pytest.approx(SEDAN.wheelbase / 20.0, abs=0.01)
+
+
+def test_the_film_in_a_track_has_its_own_roughness():
+    even = lane(2.0, 14.0, irregularity_left=0.0, irregularity_right=0.0)
+    _, c = truth(scenario(speed=((0.0, 20.0),), lanes=(even,), duration_s=14.0))
+    left, right = (c[f"true_film_r{s}"][4000:] for s in "lr")
+    assert left.std() / left.mean() == pytest.approx(TYRES["worn_summer"].track_irregularity, rel=0.3)
+    assert abs(np.corrcoef(left, right)[0, 1]) < 0.4
 
 
 def test_lane_in_metres_starts_where_it_says():

@@ -451,15 +451,19 @@ def test_wave_drag():
 
 def test_residual_film():
     h = np.array([0.0, 0.3, 0.6, 1.3, 2.0]) * MM
-    kept = np.minimum(h, 0.5 * MM)
+    kept = 0.5 * MM * (1 - np.exp(-h / (0.5 * MM)))
     assert water.residual_film(h, one(1.0), h_track=0.5 * MM) == pytest.approx(kept)
+    assert kept[1] / h[1] > 0.7 > 0.3 > kept[4] / h[4]  # a share of the undisturbed film, less of a deeper one
+    assert water.residual_film(one(1.0), one(1.0), h_track=0.5 * MM)[0] == pytest.approx(0.5 * MM, rel=1e-3)
     assert water.residual_film(h, one(0.0), h_track=0.5 * MM) == pytest.approx(h)
     # a front wheel with half its contact leaves much the same of 0.6 as of 2 mm (thesis 2.3 on Fig. 2.17)
     half = water.residual_film(h, one(0.5), h_track=0.5 * MM)
-    assert half[4] - half[2] < 0.03 * (h[4] - h[2])
+    assert half[4] - half[2] < 0.15 * (h[4] - h[2])
     film = water.residual_film(one(2 * MM), L_ALL, h_track=0.5 * MM)
     assert (np.diff(film) <= 0).all()
-    assert water.residual_film(one(2 * MM), np.array([-0.1, 1.1]), h_track=0.5 * MM) == pytest.approx([2e-3, 0.5e-3])
+    assert water.residual_film(one(2 * MM), np.array([-0.1, 1.1]), h_track=0.5 * MM) == pytest.approx(
+        [2e-3, 0.491e-3], rel=1e-3
+    )
 
 
 # --- roads that yield -------------------------------------------------------------------------------------------------

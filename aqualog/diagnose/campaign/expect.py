@@ -29,7 +29,7 @@ NODES = 32  # points at which contact and depth are averaged
 S_MAX = 0.10  # [-] a wheel that slips more spins, and no regression uses it (`campaign.slip_slope`)
 _CONTACT = np.linspace(0.0, 1.0, 101)
 _SHARE = np.linspace(0.0, 0.995, 200)  # force over what the contact carries
-_PRIMES = (2, 3, 5, 7)
+_PRIMES = (2, 3, 5, 7, 11)
 
 
 class Driven(NamedTuple):
@@ -135,7 +135,9 @@ def _respond(v, a, traction, which, wet, cars, wheels, lanes, points, table):  #
             count, sum_s, sum_ss, sum_L = 0, 0.0, 0.0, 0.0
             for node in range(nodes):
                 uneven = 1.0 + lanes[k, 2 + side] * points[node, 0]
-                film = left[node] if rear else lanes[k, side] * max(uneven, 0.0)
+                if rear:
+                    uneven = 1.0 + lanes[k, 4] * q.track_irregularity * points[node, 4]
+                film = (left[node] if rear else lanes[k, side]) * max(uneven, 0.0)
                 L, s, drag = 1.0, 0.0, 0.0
                 if film > 0.0:
                     noise = _FIELD_SHARE * (points[node, 1] + points[node, 2 + rear])
@@ -189,7 +191,7 @@ def _table() -> FloatArray:
 
 @lru_cache(maxsize=1)
 def _points() -> FloatArray:
-    """Points (NODES, 4) of independent normal variables, even in space: depth, road, front and rear wheel."""
+    """Points (NODES, 5) of independent normal variables, even in space: depth, road, wheels, film in the track."""
     normal = NormalDist()
     columns = []
     for prime in _PRIMES:

@@ -113,7 +113,7 @@ def resistance(t: FloatArray, c: Mapping[str, FloatArray], scenario: Scenario) -
     omega_dot = np.array([np.gradient(c[f"omega_{w}"], t) for w in WHEELS])
     nominal = nominal_acceleration(
         torque, loads, c["true_v_x"], omega_dot, arm=np.array([car.arm(w) for w in WHEELS]),
-        inertia=np.array([car.inertia(w) for w in WHEELS]), mass=mass, r_w=car.rolling_resistance,
+        inertia=np.array([car.turning_inertia(w) for w in WHEELS]), mass=mass, r_w=car.rolling_resistance,
         drag_area=car.drag_area, air_density=car.air_density,
     )  # fmt: skip
     return np.asarray(nominal - c["a_x"], dtype=np.float64)
@@ -128,7 +128,7 @@ def slip_and_traction(
     s = wheel_slip(omega, c["true_v_x"], car.r_e(wheel))
     mu = traction_coefficient(
         c[f"torque_{wheel}"], c[f"true_load_{wheel}"], np.gradient(omega, t), arm=car.arm(wheel),
-        inertia=car.inertia(wheel), r_w=car.rolling_resistance,
+        inertia=car.turning_inertia(wheel), r_w=car.rolling_resistance,
     )  # fmt: skip
     return np.asarray(s, dtype=np.float64), np.asarray(mu, dtype=np.float64)
 
