@@ -33,8 +33,8 @@ from aqualog.detect.detector import (
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
-    "HELD_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SPIN_UP", "SpinParams", "SpinState", "SpinWatch",
-    "initial_state", "scan", "wheel_evidence",
+    "HELD_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SPIN_UP", "SpinParams", "SpinState",
+    "SpinWatch", "initial_state", "scan", "wheel_evidence",
 ]  # fmt: skip
 
 THRESHOLD = 0.6  # [m/s]
