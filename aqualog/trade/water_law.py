@@ -157,7 +157,8 @@ def fit_water(passes: Sequence[WetPass], vehicle: Vehicle, tyre: Tyre, *, p: flo
     The slip of a front wheel on even water follows from the balance of its torques (`even_slip`). A window's speed of
     full aquaplaning scatters about the law's; the likelihood is the mean over that. Estimates are means of the
     posterior over a grid, flat in the logarithms. Intervals: the larger of its standard deviation and that of a
-    jackknife over passes, with Student's t, and on top of it what an uneven road does to the balance. The slip slope of the vehicle file is taken as exact.
+    jackknife over passes, with Student's t, and on top of it what an uneven road does to the balance. The slip slope
+    of the vehicle file is taken as exact.
 
     Source: the balance of `model/wheel.py`; jackknife as in `calibrate`.
     """
