@@ -14,6 +14,7 @@ from aqualog.model.scenario import Lane, Profile, Scenario, Steering
 from aqualog.model.situations import SITUATIONS, TUNING_POOL, Drawn, draw
 from aqualog.model.tyre import TYRES
 from aqualog.model.tyre_tests import braking_test, curve_test, straight_test
+from aqualog.model.water_numbers import drawn_tyre
 
 __all__ = ["PROGRAMMES", "SCENES", "Run", "scene", "situations", "thesis"]
 
@@ -79,9 +80,18 @@ def _of_situation(d: Drawn) -> Run:
     return Run(f"{d.name}_1", d.scenario, d.name, "", depth, given, d.believed)
 
 
+def thesis_drawn() -> tuple[Run, ...]:
+    """The thesis' programme, each run on tyres drawn from what is known of the law of water (`water_numbers`)."""
+    return tuple(replace(run, scenario=_on_drawn_tyres(run.scenario)) for run in thesis())
+
+
+def _on_drawn_tyres(s: Scenario) -> Scenario:
+    return replace(s, tyre_front=drawn_tyre(s.tyre_front, s.seed), tyre_rear=drawn_tyre(s.tyre_rear, s.seed))
+
+
 PROGRAMMES: dict[str, Callable[[], tuple[Run, ...]]] = {
-    "thesis": thesis, "situations": situations, "straight-test": straight_test, "curve-test": curve_test,
-    "braking-test": braking_test,
+    "thesis": thesis, "thesis-drawn": thesis_drawn, "situations": situations,
+    "straight-test": straight_test, "curve-test": curve_test, "braking-test": braking_test,
 }  # fmt: skip
 
 _Drive = tuple[_Case, float, float, int, str, str]
