@@ -25,7 +25,7 @@ _V = np.arange(20.0, 141.0, 1.0)  # [km/h]
 _USUAL = Condition(3.0, 1.6, 1.9, 4000.0)
 _TREADS, _PRESSURES, _LOADS = (1.6, 4.0, 7.8), (1.4, 1.9, 2.2, 2.8), (3000.0, 4000.0, 5200.0)
 _DRAG_DEPTHS = (0.6, 1.3, 2.0, 8.0)
-_TEXTURE = 0.78e-3  # [m] of the road in Gallaway's formula
+_TEXTURE = 0.78e-3  # [m] of the road in the formula of [gallaway1979]
 _NAMES = {
     "full_speed": "full aquaplaning", "contact": "contact", "fade": "fade of friction", "drag": "drag",
     "drag_ratio": "ratio of drags", "drag_by_speed": "drag: exponent over speed",
@@ -59,7 +59,7 @@ def _marks(rows: Sequence[Compared], level: Of, levels: Sequence[float], x: Of) 
 
 
 def _formulas(p: float) -> list[Line]:
-    """The published formulas, worn tyre and 4 kN, at a pressure [bar]; PAVDRN within its range."""
+    """The formulas of `physics.hydroplaning`, worn tyre and 4 kN, at a pressure [bar]; that of thin films to 2.4 mm."""
     h, pressure, load = _DEPTHS * 1e-3, np.full_like(_DEPTHS, p * 1e5), np.full_like(_DEPTHS, 4000.0)
     thin = np.where(_DEPTHS <= 2.4, pavdrn_speed(h), np.nan)
     found: dict[str, tuple[FloatArray, str]] = {
