@@ -50,7 +50,9 @@ class Tyre:
         "m/s", 120.5 / 3.6, 5.0, 100.0, "full aquaplaning of an even contact at 1.3 mm, 1.9 bar, 4 kN, 1.6 mm of tread",
         "A: fluctuating and turning slower, 3 of 4 front wheels stop within 0.5 s at 118 km/h",
     )  # fmt: skip
-    pressure_exponent: float = _of("-", 0.3, 0.0, 1.0, "m of v_full ~ p^m", "fitted; 0.5 [horne1963], 0.3 [gallaway1979] (K)")
+    pressure_exponent: float = _of(
+        "-", 0.3, 0.0, 1.0, "m of v_full ~ p^m", "fitted; 0.5 [horne1963], 0.3 [gallaway1979] (K)"
+    )
     thin_gain: float = _of("-", 0.58, 0.0, 3.0, "v_full of thin films over that of bulk water, less 1", "fitted")
     h_bulk: float = _of(
         "m", 2.0e-3, 1e-4, 0.05, "depth at which bulk water begins to rule",
