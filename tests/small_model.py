@@ -78,7 +78,7 @@ def _brush(s, C, mu, F_z):  # type: ignore[no-untyped-def]
 @compiled
 def _integrate(  # type: ignore[no-untyped-def]
     n, dt, v, target, holds, extra, brake, lock, yaw, steer, grade, depth, mu_road, slope, rough, scatter,
-    v_full_f, v_full_r, F_z, r_e, r_l, inertia, split, half_track, wheelbase, mass, r_w, c_air,
+    v_full_f, v_full_r, F_z, r_e, inertia, split, half_track, wheelbase, mass, r_w, c_air,
 ):  # fmt: skip
     omega = np.empty(4)
     y = np.array([half_track, -half_track, half_track, -half_track])
@@ -115,11 +115,11 @@ def _integrate(  # type: ignore[no-untyped-def]
             torque = (split if not is_front else 1.0 - split) * 0.5 * engine
             braking = brake[k] * (0.32 if is_front else 0.18) + lock[k, i]
             water = RHO_WATER * TYRE_WIDTH * max(film - STORAGE_DEPTH, 0.0) * v_i * v_i
-            resist = (r_w * F_z[i] + water) * r_l[i] + FRONT_SHIFT * F_z[i] * (1.0 - contact)
-            load = (torque - force * r_l[i] + rough[k, i]) - (resist + braking) * np.sign(omega[i])
+            resist = (r_w * F_z[i] + water) * r_e[i] + FRONT_SHIFT * F_z[i] * (1.0 - contact)
+            load = (torque - force * r_e[i] + rough[k, i]) - (resist + braking) * np.sign(omega[i])
             # the local slope of the brush curve: with the initial one, a sliding wheel would seem to have more inertia
             theta = min(C * abs(s) / max(3.0 * mu * F_z[i], 1.0), 1.0)
-            stiff = C * (1.0 - theta) ** 2 * r_e[i] * r_l[i] / max(abs(v_i), 1.0)
+            stiff = C * (1.0 - theta) ** 2 * r_e[i] ** 2 / max(abs(v_i), 1.0)
             omega[i] += dt * load / (inertia[i] + dt * stiff)
             if omega[i] < 0.0:
                 omega[i] = 0.0
@@ -180,7 +180,7 @@ def simulate(drive: Drive) -> dict[str, Array]:
         n, STEP, target[0], target, drive.holds_speed, _profile(drive.extra_torque, t), _profile(drive.brake_torque, t),
         lock, yaw, steer, _profile(drive.grade, t), depth, mu, slope, rough, scatter, drive.v_full_kmh / 3.6,
         (drive.v_full_rear_kmh or drive.v_full_kmh) / 3.6, loads,
-        np.array([vehicle.r_e(w) for w in WHEELS]), np.array([vehicle.r_l(w) for w in WHEELS]),
+        np.array([vehicle.r_e(w) for w in WHEELS]),
         np.array([vehicle.inertia(w) for w in WHEELS]), vehicle.torque_split_rear, 0.5 * vehicle.track,
         vehicle.wheelbase, vehicle.mass, vehicle.rolling_resistance, 0.5 * vehicle.drag_area * vehicle.air_density,
     )  # fmt: skip

@@ -66,13 +66,13 @@ def drive(
         columns[f"omega_{w}"] = v / (1.0 - slip) / car.r_e(w) + rng.normal(0.0, noise * 22.0 / car.r_e(w), n)
         if i in driven and torque:
             columns[f"torque_{w}"] = (
-                (mu + car.rolling_resistance) * load[i] * car.r_l(w) + car.inertia(w) * a_kin / car.r_e(w)
+                (mu + car.rolling_resistance) * load[i] * car.arm(w) + car.inertia(w) * a_kin / car.r_e(w)
             )  # fmt: skip
     columns["a_x"] = a_x + rng.normal(0.0, 0.05, n)
     columns["v_x"] = np.interp(t - late_v, t, v) + rng.normal(0.0, 0.005, n)
     for i in driven:
         if noise_torque and torque:
-            columns[f"torque_{WHEELS[i]}"] += noise_torque * load[i] * car.r_l(WHEELS[i]) * rng.normal(size=n)
+            columns[f"torque_{WHEELS[i]}"] += noise_torque * load[i] * car.arm(WHEELS[i]) * rng.normal(size=n)
     if brakes:
         columns["brake_pressure"] = np.zeros(n)
     for name in keep and set(columns) - {"t", *keep}:

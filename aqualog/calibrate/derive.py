@@ -12,7 +12,7 @@ from aqualog.calibrate.records import Parameter, TieRodFit
 from aqualog.calibrate.spread import Spread, half_width
 from aqualog.core.errors import ConfigError
 from aqualog.core.provenance import provenance_of, uncertainty
-from aqualog.core.vehicle import KEYS, Provenance, Vehicle
+from aqualog.core.vehicle import KEYS, WATER, Provenance, Vehicle, WaterNumber
 
 __all__ = [
     "FIXABLE", "GAIN_SD", "balance_parameters", "calibrated", "check_fixed", "contradicted", "derived", "estimates",
@@ -230,6 +230,16 @@ def _provenances(
     return {**found, **dict.fromkeys(sorted(unsaid), Provenance("guess"))}
 
 
+def _water_numbers(parameters: Sequence[Parameter]) -> dict[str, WaterNumber]:
+    """Numbers of the law of water that passes have identified; 1.96 of the deviation is half of the interval."""
+    own = (p for p in parameters if p.name in WATER and p.identified and not p.kept)
+    return {p.name: WaterNumber(_rounded(p.value), _rounded((p.ci95[1] - p.ci95[0]) / 3.92)) for p in own}
+
+
+def _rounded(x: float) -> float:
+    return float(f"{x:.{DIGITS}g}")
+
+
 def calibrated(
     vehicle: Vehicle,
     parameters: Sequence[Parameter],
@@ -251,4 +261,5 @@ def calibrated(
     scale = {"torque_gain": vehicle.torque_gain}
     seen = {n: float(f"{sd * scale.get(n, 1.0):.{DIGITS}g}") for n, sd in (spread or {}).items()}
     tables = {"spread": {**vehicle.spread, **seen}, "provenance": _provenances(vehicle, values, given)}
-    return replace(vehicle, **changed, **polynomials, **tables, given=given)  # type: ignore[arg-type]
+    water = {**vehicle.water, **_water_numbers(parameters)}
+    return replace(vehicle, **changed, **polynomials, **tables, water=water, given=given)  # type: ignore[arg-type]

@@ -113,7 +113,7 @@ REASONS = ("signals missing", "slow or standing", "braking", "brakes not known",
 class Windows(NamedTuple):
     """Means over windows (n,) of one drive.
 
-    `a_x` specific force [m/s²], `force` sum (T - I omega_dot) / r_l [N], `drag` air drag of 1 m² [N], `v` [m/s],
+    `a_x` specific force [m/s²], `force` sum (T - I omega_dot) / arm [N], `drag` air drag of 1 m² [N], `v` [m/s],
     `t` [s], `block` index of the stretch that a window is resampled with.
     """
 
@@ -176,14 +176,14 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str) -> Drive:
     a_x = columns["a_x"]
     v = features["v_x_hat"]
     # a wheel without a torque signal rolls freely
-    torque = np.sum([columns[f"torque_{w}"] / vehicle.r_l(w) for w in WHEELS if f"torque_{w}" in columns], axis=0)
+    torque = np.sum([columns[f"torque_{w}"] / vehicle.arm(w) for w in WHEELS if f"torque_{w}" in columns], axis=0)
     v_lag = lag_between(np.gradient(v, dt), a_x, dt)
     torque_lag = lag_between(torque, a_x, dt)
     v = earlier(v, v_lag, dt)
     spinning = np.zeros_like(v)  # the part of the torque that spins the wheels (E5); else they follow the car
     for w in WHEELS:
         omega = columns[f"omega_{w}"] if f"omega_{w}" in columns else v / vehicle.r_e(w)
-        spinning = spinning + vehicle.inertia(w) * np.gradient(omega, dt) / vehicle.r_l(w)
+        spinning = spinning + vehicle.turning_inertia(w) * np.gradient(omega, dt) / vehicle.arm(w)
     force = earlier(torque, torque_lag, dt) - spinning
     reason = _reasons(a_x, v, force, columns, features, vehicle, dt)
     used = reason == 0

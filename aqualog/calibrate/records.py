@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from aqualog.core.records import FloatArray
 
-__all__ = ["Calibration", "DriveFit", "Parameter", "TieRodFit"]
+__all__ = ["Calibration", "DriveFit", "Parameter", "PassFit", "TieRodFit"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,11 +78,25 @@ class TieRodFit:
 
 
 @dataclass(frozen=True, slots=True)
+class PassFit:
+    """A pass over water: `v` mean speed and that at which a wheel was lost, NaN if none [m/s]; `h_w` water [m]; windows
+    of half a second; `why` it does not count, empty if it does."""
+
+    name: str
+    v: float
+    v_lost: float
+    h_w: float
+    windows: int
+    why: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Calibration:
     """Result over all drives. `fixed` are the values given from outside; `cannot_tell` are sentences.
 
     `transfers` are polynomials by section of the vehicle file: `tie_rod`, `steering_torque`. `spread` is the standard
-    deviation by which one more drive differs from a parameter, in its unit; empty with too few drives.
+    deviation by which one more drive differs from a parameter, in its unit; empty with too few drives. `passes` are
+    those over water, where the numbers of the law of water were fitted.
     """
 
     vehicle_name: str
@@ -93,6 +107,7 @@ class Calibration:
     notes: tuple[str, ...]
     transfers: Mapping[str, TieRodFit] = field(default_factory=dict)
     spread: Mapping[str, float] = field(default_factory=dict)
+    passes: tuple[PassFit, ...] = ()
 
     def get(self, name: str) -> Parameter:
         """Return the parameter of this name; KeyError without one."""

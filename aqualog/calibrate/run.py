@@ -29,6 +29,7 @@ from aqualog.calibrate.records import Calibration, DriveFit, Parameter
 from aqualog.calibrate.spread import DRIVES_MIN, Spread, half_width, jackknife_of, one_more, spread_of
 from aqualog.calibrate.tie_rod import transfers
 from aqualog.core.errors import FitError
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import SPREAD, Vehicle
 from aqualog.physics.load import G
@@ -151,6 +152,8 @@ def calibrate(
             expected="stretches above 20 km/h (a slalom for the tie rods needs straight driving beside it)",
             hint="what was left out: " + "; ".join(f"{d.name}: {words.left_out(d.left_out)}" for d in all_drives),
         )  # fmt: skip
+    radii = radius_parameters(usable, vehicle)
+    usable = _by_lever(usable, vehicle, calibrated(vehicle, radii if accept else keeping(radii, vehicle)))
     samples = [Sample(d.windows, energy_offset(d)) for d in usable]
     # without the driven axle the torques of the log need not be all of the drive
     lacking = next((d.no_balance for d in usable if d.no_balance), "")
@@ -161,7 +164,7 @@ def calibrate(
     fits, found, spread = balance.fits, balance.found, balance.spread
     estimated = (
         *balance.parameters,
-        *radius_parameters(usable, vehicle),
+        *radii,
         *_offsets(fits, samples, balance.levels, fixed),
     )
     if not accept:
@@ -185,6 +188,21 @@ def calibrate(
     return Calibration(
         vehicle.name, parameters, tuple(fits), fixed, words.cannot_tell(parameters, missing), notes, rods, differing
     )
+
+
+def _by_lever(drives: Sequence[Drive], before: Vehicle, after: Vehicle) -> list[Drive]:
+    """The drives with the forces that their torques make on the radii that are written (E24)."""
+    ratio = {w: before.arm(w) / after.arm(w) for w in WHEELS}
+    if set(ratio.values()) == {1.0}:
+        return list(drives)
+    out = []
+    for d in drives:
+        torques = {w: d.columns[f"torque_{w}"] for w in WHEELS if f"torque_{w}" in d.columns}
+        size = {w: float(np.sqrt(np.nanmean(x * x))) for w, x in torques.items()}
+        factor = sum(ratio[w] * x for w, x in size.items()) / max(sum(size.values()), 1e-9)
+        force = factor * d.windows.force
+        out.append(d._replace(windows=d.windows._replace(force=force), force=factor * d.force))
+    return out
 
 
 class _Balanced(NamedTuple):

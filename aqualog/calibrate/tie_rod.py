@@ -68,7 +68,7 @@ def _telling(drive: Drive, vehicle: Vehicle) -> BoolArray:
         if "brake_pressure" in columns:
             braked = columns["brake_pressure"] > BRAKE_PRESSURE
         else:
-            braked = (f["a_kin_slow"] < A_BRAKED) | (torque / vehicle.r_l("fl") < LIFTED * vehicle.mass * G)
+            braked = (f["a_kin_slow"] < A_BRAKED) | (torque / vehicle.arm("fl") < LIFTED * vehicle.mass * G)
         bits: BoolArray = drive.dry & (np.abs(f["a_y_slow"]) < A_Y_MAX) & (f["v_x_hat"] > V_MIN)
     return bits & ~widened(braked, max(round(BESIDE_S / drive.dt), 1))
 

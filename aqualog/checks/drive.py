@@ -59,9 +59,9 @@ def _gain(windows: Windows) -> Iterator[Doubt]:
     if "mass" not in car.given or "a_x" not in windows or not axles or windows.speed.size < 3:
         return
     v, a_x = windows.speed, windows["a_x"]
-    inertia = sum(2.0 * car.inertia(f"{a}l") / car.r_e(f"{a}l") for a in AXLES)
-    force = np.sum([windows[f"torque_{a}"] / car.r_l(f"{a}l") for a in axles], axis=0)
-    pushed = (force - inertia / car.r_l("fl") * np.gradient(v, windows.step_s)) / car.mass
+    inertia = sum(2.0 * car.turning_inertia(f"{a}l") / car.r_e(f"{a}l") for a in AXLES)
+    force = np.sum([windows[f"torque_{a}"] / car.arm(f"{a}l") for a in axles], axis=0)
+    pushed = (force - inertia / car.arm("fl") * np.gradient(v, windows.step_s)) / car.mass
     with np.errstate(invalid="ignore"):
         good = (v > MOVING) & (pushed > PUSHED) & np.isfinite(a_x)
     if "yaw_rate" in windows:

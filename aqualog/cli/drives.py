@@ -14,20 +14,25 @@ __all__ = ["calibrate", "diagnose", "evaluate", "validate"]
 
 
 @command(
-    "logs:drives vehicle:needed signals dbc out:vehicle fix accept page:calibration rate correct_offsets cache "
+    "logs:drives vehicle:needed signals dbc out:vehicle wet fix accept page:calibration rate correct_offsets cache "
     "data force"
 )
-def calibrate(run: Run, out: Path | None, fix: list[str] | None, accept: bool, page: Path | None) -> Output:
+def calibrate(run: Run, out: Path | None, wet: bool, fix: list[str] | None, accept: bool, page: Path | None) -> Output:
     """Estimate what detectors must know of a car from its dry drives, with intervals and what cannot be determined.
 
     Mass, rolling resistance, drag area, effective radii, torque gain, accelerometer offset, and the polynomials of tie
     rods and steering. The drives must be dry and with the same load; four or more show how drives differ. The vehicle
     file must be given: it says which axle is driven. A value in it that the drives contradict stays, unless --accept.
 
+    With --wet, passes over water show how the car's tyres float: the speed of full aquaplaning in the reference
+    condition (v_anchor), and how fast the contact is lost below it (contact_exponent). Name four or more passes, from
+    partial to full aquaplaning, each with a dry second before the water, and tread and pressure with --fix.
+
     \b
     Examples:
       aqualog calibrate dry1.mf4 dry2.mf4 dry3.mf4 dry4.mf4 --vehicle car.toml -o calibrated.toml
       aqualog calibrate dry*.mcap --vehicle car.toml --fix mass=1482 --json
+      aqualog calibrate --wet pass*.mf4 --vehicle car.toml --fix tread=1.6 --fix pressure=2.2 -o wet.toml
       aqualog calibrate monday/ tuesday/ --vehicle car.toml --signals map.toml --page calibration.html
     """
     from aqualog.core.errors import ExitCode
@@ -35,12 +40,14 @@ def calibrate(run: Run, out: Path | None, fix: list[str] | None, accept: bool, p
     from aqualog.face.drives import NothingUsableError, grouped
 
     run.need_vehicle("which axle is driven, radii, axle distances")
-    fixed = _fixed(fix or [])
+    fixed = _fixed(fix or [], wet=wet)
     targets = [p for p in (out, page) if p is not None]
     drive = run.drive(targets)
     try:
         with run.hearing("nothing was written") as hear:
-            result = calibrate(grouped(run.logs, drive), drive.vehicle, fix=fixed, accept=accept, progress=hear)
+            result = calibrate(
+                grouped(run.logs, drive), drive.vehicle, fix=fixed, accept=accept, wet=wet, progress=hear
+            )
     except NothingUsableError:  # each reason was reported
         return Output(code=int(ExitCode.NOTHING_USABLE))
     if out is not None:
@@ -50,10 +57,11 @@ def calibrate(run: Run, out: Path | None, fix: list[str] | None, accept: bool, p
     return Output(result, [*result.notes, *(f"written: {path}" for path in targets)])
 
 
-def _fixed(texts: list[str]) -> dict[str, float]:
+def _fixed(texts: list[str], *, wet: bool) -> dict[str, float]:
     """Return `mass=1400` as a mapping; the estimator checks names and bounds."""
     from aqualog.calibrate.derive import check_fixed
     from aqualog.core.errors import ConfigError
+    from aqualog.trade.water_law import check_known
 
     fixed: dict[str, float] = {}
     for text in texts:
@@ -65,7 +73,10 @@ def _fixed(texts: list[str]) -> dict[str, float]:
         if name.strip() in fixed:
             raise ConfigError(f"--fix {name.strip()} is given twice", expected="one value for each key")
         fixed[name.strip()] = number
-    check_fixed(fixed)
+    if wet:
+        check_known(fixed)
+    else:
+        check_fixed(fixed)
     return fixed
 
 

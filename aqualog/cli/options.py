@@ -168,8 +168,10 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "out:vehicle": _file("Vehicle file with the calibrated values."),
     "fix": _option(
         list[str] | None, None, "--fix", metavar="KEY=VALUE",
-        help="What is known: mass=KG, torque_gain=X, drag_area=M2 or rolling_resistance=X; may be repeated.",
+        help="What is known: mass=KG, torque_gain=X, drag_area=M2 or rolling_resistance=X; with --wet tread=MM, "
+        "pressure=BAR and depth=MM. May be repeated.",
     ),
+    "wet": _flag("Fit how the tyres float, to passes over water.", "--wet"),
     "accept": _flag("Take the drives' values also where the vehicle file says something else.", "--accept"),
     "page:calibration": _file("Page with tables and residuals (HTML).", "--page"),
     "holdout": _option(

@@ -101,6 +101,7 @@ def figures(run: Run, numbers: list[str], out: Path, campaign: Path | None, form
       aqualog figures 2 -o figures --campaign campaign.toml
       aqualog figures 2.17 -o figures --campaign campaign.toml --format html,csv,svg
       aqualog figures 3 -o figures --json
+      aqualog figures W.1 -o figures
       aqualog figures all -o figures --progress plain
     """
     from aqualog.core.errors import ConfigError, ExitCode
@@ -131,7 +132,8 @@ def reproduce(run: Run, out: Path) -> Output:
 
     Leaves one page (index.html) with the 36 figures and the 118 claims: what the thesis says, what comes out here with
     its uncertainty, by which criterion, and the verdict; the tables behind the figures, and the campaign with its
-    results. Broken off, the same command goes on where it stopped. A few minutes on two cores.
+    results. One more figure, W.1, holds the simulator against what others have published. Broken off, the same command
+    goes on where it stopped. A few minutes on two cores.
 
     \b
     Examples:

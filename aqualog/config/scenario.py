@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -117,7 +117,7 @@ def load_scenario(path: Path) -> Scenario:
     _check_names(file, "", *_TABLES)
     vehicle = _vehicle(file, path.parent)
     car = vehicle or Vehicle()  # so that the rest of the file is checked too; never returned
-    tyre = _tyre(file, "tyre") or TYRES["worn_summer"]
+    tyre = _tyre(file, "tyre", car) or _own(TYRES["worn_summer"], car)
     _not_all(file, "tyre", ("tyre_front", "tyre_rear"))
     _not_all(file, "pressure_bar", ("pressure_front_bar", "pressure_rear_bar"))
     bar = _value(file, "pressure_bar")
@@ -131,8 +131,8 @@ def load_scenario(path: Path) -> Scenario:
         file.add("split_profile", f'split_profile needs an "awd" car; the vehicle is "{car.drivetrain}"')
     scenario = Scenario(
         vehicle=car,
-        tyre_front=_tyre(file, "tyre_front") or tyre,
-        tyre_rear=_tyre(file, "tyre_rear") or tyre,
+        tyre_front=_tyre(file, "tyre_front", car) or tyre,
+        tyre_rear=_tyre(file, "tyre_rear", car) or tyre,
         p_front=_value(file, "pressure_front_bar", bar) * 1e5,
         p_rear=_value(file, "pressure_rear_bar", bar) * 1e5,
         load_front=loads["load_front_kg"],
@@ -261,12 +261,17 @@ def _vehicle(file: Table, base: Path) -> Vehicle | None:
         return None
 
 
-def _tyre(file: Table, name: str) -> Tyre | None:
+def _own(tyre: Tyre, car: Vehicle, given: Iterable[str] = ()) -> Tyre:
+    """The tyre with what the vehicle file knows of how it floats, but for what the scenario gives."""
+    return replace(tyre, **{n: w.value for n, w in car.water.items() if n not in given})  # type: ignore[arg-type]
+
+
+def _tyre(file: Table, name: str, car: Vehicle) -> Tyre | None:
     given = file.get(name)
     if given is None:
         return None
     if isinstance(given, str) and given in TYRES:
-        return TYRES[given]
+        return _own(TYRES[given], car)
     if not isinstance(given, dict):
         file.add(name, f"{name} = {repr(given)[:40]} is not one of {quoted(TYRES)}, or a table")
         return None
@@ -274,7 +279,7 @@ def _tyre(file: Table, name: str) -> Tyre | None:
     base = table.choice("base", TYRES, "worn_summer")
     values = table.numbers(TYRE_KEYS, "base")
     changed: dict[str, Any] = {"name": f"{base}, changed" if values else base, **values}
-    return replace(TYRES[base], **changed)
+    return _own(replace(TYRES[base], **changed), car, values)
 
 
 # --- drive

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 from aqualog.config.reader import Table, is_real, quoted, read
 from aqualog.core.errors import ConfigError
@@ -16,13 +16,18 @@ from aqualog.core.vehicle import (
     SOURCES,
     SPLIT,
     SPREAD,
+    WATER,
     Known,
     Provenance,
+    TorqueArm,
     Vehicle,
+    WaterNumber,
+    arm_lines,
     known_lines,
     provenance_lines,
     spread_lines,
     usual,
+    water_lines,
 )
 
 if TYPE_CHECKING:
@@ -36,8 +41,8 @@ LARGEST_GAIN = 100.0  # [-], [m] of the first power; a rod bears a tenth to a ha
 TYPICAL_FORCE = 1000.0  # [N] at which a higher power may give as much as the first (D)
 
 _SECTIONS = tuple(dict.fromkeys(k.section for k in KEYS.values() if k.section))
-_TABLES = (*_SECTIONS, *POLYNOMIALS, "spread", "provenance", "known")
-_TABLES_AND_WORDS = ("name", "drivetrain", *_TABLES)
+_TABLES = (*_SECTIONS, *POLYNOMIALS, "spread", "provenance", "known", "water")
+_TABLES_AND_WORDS = ("name", "drivetrain", "torque_arm", *_TABLES)
 
 
 def load_vehicle(path: Path) -> Vehicle:
@@ -56,6 +61,7 @@ def load_vehicle(path: Path) -> Vehicle:
         file.add("name", f"name = {values['name']!r:.60} is not one line of printable characters")
     given = {"name", *(n for n in ("drivetrain",) if n in file)}
     values["drivetrain"] = file.choice("drivetrain", SPLIT, "rwd")
+    values["torque_arm"] = file.choice("torque_arm", get_args(TorqueArm), "effective")
     for section in POLYNOMIALS:
         values[section] = _polynomial(file.table(section), section)
     values["spread"] = file.table("spread").numbers({n: _Deviation(KEYS[n].high, KEYS[n].unit) for n in SPREAD})
@@ -68,6 +74,7 @@ def load_vehicle(path: Path) -> Vehicle:
         table = file.table(section)
         _numbers(table, section, table.values, values, given)
     values["known"] = _known(file.table("known"))
+    values["water"] = _water(file.table("water"))
     values["provenance"] = _provenance(file.table("provenance"), given)
     file.faults.raise_if_any()
     car = Vehicle(**values, given=frozenset(given))
@@ -159,6 +166,29 @@ def _known(table: Table) -> dict[str, Known]:
     return found
 
 
+def _water(table: Table) -> dict[str, WaterNumber]:
+    """Read numbers of the law of water: `v_anchor = { value = 33.1, sd = 0.4 }`, or the plain number."""
+    table.check_names(*WATER)
+    found: dict[str, WaterNumber] = {}
+    if not table.values:
+        return found
+    from aqualog.model.tyre import TYRE_KEYS
+
+    for name in (n for n in table.values if n in WATER):
+        given, key = table.get(name), TYRE_KEYS[name]
+        own = table.child(name, given if isinstance(given, dict) else {name: given})
+        own.check_names("value", "sd", "source") if isinstance(given, dict) else None
+        value = own.number("value" if isinstance(given, dict) else name, key)
+        if value is None:
+            if isinstance(given, dict) and "value" not in given:
+                table.add(name, f"water.{name} has no value; expected {{ value = ..., sd = ... }}")
+            continue
+        sd = own.number("sd", _Deviation(key.high, key.unit)) if isinstance(given, dict) else None
+        source = own.choice("source", SOURCES, "calibrated") if isinstance(given, dict) else "data_sheet"
+        found[name] = WaterNumber(value, sd or 0.0, source)  # type: ignore[arg-type]
+    return found
+
+
 class _Deviation(NamedTuple):
     """Bounds of a standard deviation: at most as large as its key may be."""
 
@@ -211,7 +241,7 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     values = identified_values(calibration.parameters, vehicle)
     name = new.name.replace("\\", "").replace('"', "")
     drives = ", ".join(_plain(d.name) for d in calibration.drives)
-    lines = [f"# calibrated from {drives}", f'name = "{name}"', _drivetrain(new)]
+    lines = [f"# calibrated from {drives}", f'name = "{name}"', _drivetrain(new), *arm_lines(new)]
     section = ""
     for key in KEYS.values():
         if key.section != section:
@@ -233,6 +263,8 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
         lines += ["", "[provenance]", "# where a value comes from; sd: its standard deviation", *provenance_lines(new)]
     if new.known:
         lines += ["", "[known]", "# faults of this car that are known", *known_lines(new)]
+    if new.water:
+        lines += ["", "[water]", "# how its tyres float, for `simulate`", *water_lines(new)]
     for part in POLYNOMIALS:
         table = getattr(new, part)
         if not table:

@@ -46,6 +46,7 @@ TYPICAL: Mapping[str, Typical] = {
     "rolling_resistance": _shares(0.05, 0.08, 0.20, 0.30, "drum against road; surface, warmth; 0.007-0.017 (V)"),
     "torque_split_rear": Typical(0.02, 0.03, 0.05, 0.15, "clutches share the torque as they are driven (K)"),
     "torque_gain": _shares(0.01, 0.01, 0.05, 0.20, "axle efficiency 0.95-0.97 (V); a motor's gave 0.82 (D)"),
+    "driveline_inertia": Typical(0.2, 0.5, 1.0, 1.5, "changes with the square of the gear (K)"),
     "steering_ratio": _shares(0.005, 0.01, 0.03, 0.10, "a turning plate; many ratios vary with the angle (K)"),
     "wheels.r_e_f": _RADIUS,
     "wheels.r_e_r": _RADIUS,

@@ -20,20 +20,26 @@ __all__ = [
     "SOURCES",
     "SPLIT",
     "SPREAD",
+    "WATER",
     "Drivetrain",
     "Key",
     "Known",
     "Provenance",
     "Source",
+    "TorqueArm",
     "Vehicle",
+    "WaterNumber",
+    "arm_lines",
     "known_lines",
     "provenance_lines",
     "spread_lines",
     "usual",
     "vehicle_toml",
+    "water_lines",
 ]
 
 Drivetrain = Literal["rwd", "fwd", "awd"]
+TorqueArm = Literal["effective", "loaded"]
 Source = Literal["measured", "calibrated", "data_sheet", "guess"]
 
 
@@ -69,6 +75,10 @@ _ALL = [
     Key("", "rolling_resistance", "-", 0.0105, 0.0, 0.1, "coefficient r_w, dry", "0.007-0.017 (V, [trb2006])"),
     Key("", "torque_split_rear", "-", 0.5, 0.0, 1.0, "rear share of drive torque", "1 rwd, 0 fwd, 0.5 awd"),
     Key("", "torque_gain", "-", 1.0, 0.1, 100.0, "torque at the wheels over the one that the log says", "none"),
+    Key(
+        "", "driveline_inertia", "kg*m^2", 0.0, 0.0, 100.0, "engine or motor and gears, at the driven wheels",
+        "0: torque at the half shafts; engine 1-3, electric axle 3-6 (K)",
+    ),
     Key("", "steering_ratio", "-", 15.0, 5.0, 40.0, "steering wheel angle over road-wheel angle", _MID),
     Key("wheels", "r_e_f", "m", 0.317, 0.1, 1.0, "effective rolling radius, front", "205/55R16 (D)"),
     Key("wheels", "r_e_r", "m", 0.317, 0.1, 1.0, "effective rolling radius, rear", "205/55R16 (D)"),
@@ -105,6 +115,11 @@ SOURCES: Mapping[Source, str] = {
 SPLIT: Mapping[str, float] = {"rwd": 1.0, "fwd": 0.0, "awd": 0.5}
 """Rear share of the drive torque where a file does not set it."""
 
+WATER: Mapping[str, str] = {
+    "v_anchor": "m/s", "contact_exponent": "-",
+}  # fmt: skip
+"""Numbers of the law of water that this car's passes can show, with units; they are keys of a tyre in the simulator."""
+
 COEFFICIENTS = ("c0", "c_y", "c_x", "sigma")
 
 KEYS: dict[str, Key] = {k.path: k for k in _ALL}
@@ -131,16 +146,27 @@ class Known:
 
 
 @dataclass(frozen=True, slots=True)
+class WaterNumber:
+    """A number of the law of water, its standard deviation in the same unit (0: exact), and where it comes from."""
+
+    value: float
+    sd: float = 0.0
+    source: Source = "calibrated"
+
+
+@dataclass(frozen=True, slots=True)
 class Vehicle:
     """One vehicle, SI.
 
     `given` are the keys that the user's file sets; a detector that needs a key which is not given says so instead of
     trusting a default. `provenance` is what the file says of its values; `core.provenance` knows the rest.
-    `known`: faults by effect and place, as `signal_delay@torque`.
+    `known`: faults by effect and place, as `signal_delay@torque`. `water`: numbers of the law of water by the names of
+    `WATER`, for the tyres on this car.
     """
 
     name: str = "default car"
     drivetrain: Drivetrain = "rwd"
+    torque_arm: TorqueArm = "effective"
     mass: float = _default("mass")
     l_f: float = _default("l_f")
     l_r: float = _default("l_r")
@@ -151,6 +177,7 @@ class Vehicle:
     rolling_resistance: float = _default("rolling_resistance")
     torque_split_rear: float = 1.0
     torque_gain: float = _default("torque_gain")
+    driveline_inertia: float = _default("driveline_inertia")
     steering_ratio: float = _default("steering_ratio")
     r_e_f: float = _default("wheels.r_e_f")
     r_e_r: float = _default("wheels.r_e_r")
@@ -166,6 +193,7 @@ class Vehicle:
     spread: Mapping[str, float] = field(default_factory=dict)
     provenance: Mapping[str, Provenance] = field(default_factory=dict)
     known: Mapping[str, Known] = field(default_factory=dict)
+    water: Mapping[str, WaterNumber] = field(default_factory=dict)
     given: frozenset[str] = frozenset()
 
     @classmethod
@@ -189,9 +217,24 @@ class Vehicle:
         """Loaded radius of a wheel. [m]"""
         return self.r_l_f if wheel[0] == "f" else self.r_l_r
 
+    def arm(self, wheel: str) -> float:
+        """Lever of a wheel's torque over its force: r_e, or r_l as Eq. (2.10) is printed, by `torque_arm`. [m]
+
+        A wheel without slip loss that rolls on r_e gives T / r_e, since the power is the same (E24).
+        """
+        return self.r_e(wheel) if self.torque_arm == "effective" else self.r_l(wheel)
+
     def inertia(self, wheel: str) -> float:
-        """Inertia of a wheel about its axis. [kg·m²]"""
+        """Inertia of a wheel about its axis, without the driveline. [kg·m²]"""
         return self.inertia_f if wheel[0] == "f" else self.inertia_r
+
+    def driveline(self, wheel: str) -> float:
+        """Inertia of the driveline that turns with the mean of this wheel and the other of its axle. [kg·m²]"""
+        return self.driveline_inertia * (self.torque_split_rear if wheel[0] == "r" else 1.0 - self.torque_split_rear)
+
+    def turning_inertia(self, wheel: str) -> float:
+        """Inertia that the torque of a wheel turns where both wheels of its axle turn alike. [kg·m²]"""
+        return self.inertia(wheel) + 0.5 * self.driveline(wheel)
 
     @property
     def wheelbase(self) -> float:
@@ -223,6 +266,11 @@ class Vehicle:
         return "r" if self.drivetrain == "fwd" else "f"
 
 
+def arm_lines(vehicle: Vehicle) -> list[str]:
+    """The line of the torque's lever in a vehicle file; none for the usual one."""
+    return [] if vehicle.torque_arm == "effective" else [f'torque_arm = "{vehicle.torque_arm}"']
+
+
 def spread_lines(vehicle: Vehicle) -> list[str]:
     """The lines of the table `spread` in a vehicle file."""
     return [f"{n} = {vehicle.spread[n]!r}  # [{KEYS[n].unit}]" for n in SPREAD if n in vehicle.spread]
@@ -243,6 +291,16 @@ def known_lines(vehicle: Vehicle) -> list[str]:
     return [
         f'"{key}" = {{ {", ".join(f"{n} = {v!r}" for n, v in {**fault.values, "spread": fault.spread}.items())} }}'
         for key, fault in vehicle.known.items()
+    ]
+
+
+def water_lines(vehicle: Vehicle) -> list[str]:
+    """The lines of the table `water` in a vehicle file."""
+    said = ((n, unit, vehicle.water[n]) for n, unit in WATER.items() if n in vehicle.water)
+    return [
+        f'{n} = {{ value = {w.value!r}, sd = {w.sd!r}, source = "{w.source}" }}  # [{unit}] 95 %: '
+        f"{w.value - 1.96 * w.sd:.5g} ... {w.value + 1.96 * w.sd:.5g}"
+        for n, unit, w in said
     ]
 
 
@@ -268,7 +326,7 @@ def vehicle_toml(vehicle: Vehicle) -> str:
     name = vehicle.name.replace("\\", "").replace('"', "")
     is_from_file = "name" in vehicle.given
     hidden = "# " if is_from_file and not vehicle.knows_drivetrain and vehicle.drivetrain == "rwd" else ""
-    lines = [f'name = "{name}"', f'{hidden}drivetrain = "{vehicle.drivetrain}"']
+    lines = [f'name = "{name}"', f'{hidden}drivetrain = "{vehicle.drivetrain}"', *arm_lines(vehicle)]
     section = ""
     for key in KEYS.values():
         if key.section != section:
@@ -283,6 +341,8 @@ def vehicle_toml(vehicle: Vehicle) -> str:
         lines += ["", "[provenance]", *provenance_lines(vehicle)]
     if vehicle.known:
         lines += ["", "[known]", *known_lines(vehicle)]
+    if vehicle.water:
+        lines += ["", "[water]", *water_lines(vehicle)]
     for section in POLYNOMIALS:
         table = getattr(vehicle, section)
         if table:

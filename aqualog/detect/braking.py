@@ -123,7 +123,7 @@ class BrakeWatch:
         result = {}
         for wheel in WHEELS:
             torque = columns.get(f"torque_{wheel}")
-            share = None if torque is None else torque / (self._vehicle.r_l(wheel) * weight)
+            share = None if torque is None else torque / (self._vehicle.arm(wheel) * weight)
             bits = is_braking(f["a_kin_slow"], f.get("brake_pressure"), share)
             result[wheel], self._left[wheel] = hold_on(bits, self._left[wheel], seconds=HOLD, dt=self._dt)
         return result

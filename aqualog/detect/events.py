@@ -13,7 +13,8 @@ from aqualog.core.records import BoolArray, Event, FloatArray, Track
 __all__ = ["AFTER", "SINCE", "EventBook", "Evidence", "Explain", "Severity", "as_they_are"]
 
 Evidence = Mapping[str, tuple[str, FloatArray | BoolArray]]
-"""Name -> (how, values): `first`, `last`, `min`, `max`; of a bit, `any` or `at_start`."""
+"""Name -> (how, values): `first`, `last`, `min`, `max`; of a bit, `any` or `at_start`; of ones and
+zeros, their `share` of ones."""
 
 SINCE, AFTER = "since_s", "after_s"
 """Evidence of when the cause began and ended: seconds from there to the first (`first`) and last sample (`last`)."""
@@ -34,6 +35,7 @@ class _Open:
     start: int
     peak: float = -np.inf
     evidence: dict[str, Any] = field(default_factory=dict)
+    counts: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     def gather(self, part: slice, statistic: FloatArray, evidence: Evidence) -> None:
         """Take the samples of a piece in which the bit is set."""
@@ -58,6 +60,11 @@ class _Open:
             if how == "last":
                 self.evidence[name] = float(piece[-1])
                 continue
+            if how == "share":
+                ones, of = self.counts.get(name, (0, 0))
+                self.counts[name] = ones + int(np.count_nonzero(piece)), of + piece.size
+                self.evidence[name] = self.counts[name][0] / self.counts[name][1]
+                continue
             new, least = float(piece.min() if how == "min" else piece.max()), min if how == "min" else max
             self.evidence[name] = least(self.evidence[name], new) if name in self.evidence else new
 
@@ -65,7 +72,8 @@ class _Open:
 class _Builder:
     """Build the events of one detector at one place.
 
-    It keeps only minima, maxima and first values, so that an event cut by a piece's end comes out the same to the bit.
+    It keeps only minima, maxima, first values and counts, so that an event cut by a piece's end comes out the same to
+    the bit.
     """
 
     def __init__(self, track: Track, dt_ns: int, severity: Severity, explain: Explain) -> None:

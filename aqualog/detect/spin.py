@@ -33,12 +33,13 @@ from aqualog.detect.detector import (
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
-    "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SPIN_UP", "SpinParams", "SpinState", "SpinWatch",
-    "initial_state", "scan", "wheel_evidence",
+    "HELD_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SPIN_UP", "SpinParams", "SpinState",
+    "SpinWatch", "initial_state", "scan", "wheel_evidence",
 ]  # fmt: skip
 
 THRESHOLD = 0.6  # [m/s]
 MIN_RATE = 5.0  # [Hz] a full spin-down lasts half a second and more
+HELD_S = 0.15  # [s] for which the traction stays below that: on snow it passes there for a moment (K)
 MU_SPIN_UP = 0.07  # [-] thesis 2.1: above it, spin-up is that of another slippery road (C27)
 SLIP_FULL = -0.25  # [-] a wheel that has lost a quarter of its speed has lost the road
 MU_FULL = 0.02  # [-] what a spinning driven wheel still transmits at full aquaplaning
@@ -59,27 +60,29 @@ class SpinParams(NamedTuple):
     t_deep: float  # [s] for so long: the acceleration may have been in a gap
     a_calm: float  # [m/s^2] a wheel that is but slightly off and does not accelerate for t_calm has a wrong radius
     t_calm: float  # [s]
+    t_held: float  # [s] for which an alarm has to be allowed before it begins
 
     @staticmethod
     def make(sign: float, dt: float, threshold: float = THRESHOLD) -> SpinParams:
         """Return defaults: 3 m/s² drift, 0.6 m/s threshold, speed difference beyond 0.5 m/s and 3 %."""
         # the clamp does not follow a low threshold: joint detector 2 takes the sum up to 1.5 m/s
         sums = CusumParams(3.0, threshold, max(5.0 * threshold, 3.0), dt)
-        return SpinParams(sums, sign, 0.5, 0.03, 5.0, 0.25, 0.1, 1.0, 1.0)
+        return SpinParams(sums, sign, 0.5, 0.03, 5.0, 0.25, 0.1, 1.0, 1.0, HELD_S if sign > 0.0 else 0.0)
 
 
 class SpinState(NamedTuple):
-    """The sum [m/s], times of being far off and of being calm [s], and the detection bit."""
+    """The sum [m/s], times of being far off, calm and allowed [s], and the detection bit."""
 
     g: float
     deep: float
     calm: float
+    held: float
     active: bool
 
 
 def initial_state() -> SpinState:
     """Nothing summed up."""
-    return SpinState(0.0, 0.0, 0.0, active=False)
+    return SpinState(0.0, 0.0, 0.0, 0.0, active=False)
 
 
 @compiled
@@ -88,7 +91,7 @@ def _step(p, s, a, dv, v, allowed):  # type: ignore[no-untyped-def]
     if math.isnan(a) or math.isnan(dv) or math.isnan(v):
         return s, math.nan, False
     if v < p.v_min:
-        return SpinState(0.0, 0.0, 0.0, False), 0.0, False  # noqa: FBT003
+        return SpinState(0.0, 0.0, 0.0, 0.0, False), 0.0, False  # noqa: FBT003
     limit = max(p.v_abs, p.v_rel * v)
     g = cusum_step(p.cusum, s.g, a)
     if dv < -0.25 * limit:
@@ -96,15 +99,16 @@ def _step(p, s, a, dv, v, allowed):  # type: ignore[no-untyped-def]
         g = 0.0
     deep = s.deep + p.cusum.dt if dv > p.slip_deep * v else 0.0
     calm = s.calm + p.cusum.dt if dv < 3.0 * limit and abs(a) < p.a_calm else 0.0
+    held = s.held + p.cusum.dt if allowed else 0.0
     statistic = g
     active = s.active
     if active:
         if dv < 0.5 * limit or calm > p.t_calm:
             active = False
             g = 0.0
-    elif allowed and dv > limit and (g > p.cusum.h or deep > p.t_deep):
+    elif allowed and held >= p.t_held and dv > limit and (g > p.cusum.h or deep > p.t_deep):
         active = True
-    return SpinState(g, deep, calm, active), statistic, active
+    return SpinState(g, deep, calm, held, active), statistic, active
 
 
 @compiled
@@ -130,7 +134,7 @@ def scan(
     v_x : array (n,)
         Velocity; a coarse one suffices, since it only decides the sign. [m/s]
     allowed : bool array (n,)
-        Where an alarm may begin (spin-up: traction coefficient below 0.07).
+        Where an alarm may begin, once that has held for `t_held` (spin-up: traction coefficient below 0.07).
 
     Returns
     -------
@@ -193,7 +197,10 @@ def wheel_evidence(scene: Scene, wheel: str, mu: FloatArray | None) -> dict[str,
         "braking": ("any", braking),
         "braking_at_start": ("at_start", braking),
     }
-    return evidence if mu is None else {**evidence, "mu": ("first", mu), "mu_min": ("min", mu)}
+    if mu is None:
+        return evidence
+    lost = np.where(np.isnan(mu), np.nan, mu < MU_FULL)
+    return {**evidence, "mu": ("first", mu), "mu_min": ("min", mu), "mu_lost": ("share", lost)}
 
 
 def _needs_down(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
@@ -232,6 +239,7 @@ SPIN_UP = Detector(
     threshold=THRESHOLD,
     needs=_needs_up,
     start=partial(SpinWatch, sign=1.0),
-    # thesis 2.5, criterion 3: full and partial by the traction coefficient; partial where it is unknown
-    severity=lambda evidence: "full" if evidence.get("mu_min", 1.0) < MU_FULL else "partial",
+    # thesis 2.5, criterion 3: full and partial by the traction coefficient over the whole event, since its least value
+    # is that of a moment in which the torque changes; partial where it is unknown
+    severity=lambda evidence: "full" if evidence.get("mu_lost", 0.0) > 0.5 else "partial",
 )

@@ -158,7 +158,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         if every_wheel and brakes_unlogged(torque, v, wet, vehicle, dt):
             unlogged = "the car slows down more than its torque explains"
         if unlogged:
-            bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.r_l("fl")
+            bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.arm("fl")
             notes.append(f"{unlogged}: brakes are not in the log, driven stretches are used")
     left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(logged, vehicle, dt) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
@@ -294,7 +294,7 @@ def _on_water(course: Course) -> BoolArray:
 
 def _jerk(torque: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
     """How fast the drive's share of the acceleration changes, over 0.1 s. (n,) [m/s³]"""
-    a = torque.sum(axis=0) / (vehicle.mass * vehicle.r_l("fl"))
+    a = torque.sum(axis=0) / (vehicle.mass * vehicle.arm("fl"))
     k = max(1, round(0.5 * JERK_S / dt))
     padded = np.pad(a, k, mode="edge")
     return np.asarray(np.abs(padded[2 * k :] - padded[: -2 * k]) / (2 * k * dt))

@@ -210,7 +210,7 @@ def _rolling_resistance(plant: Plant) -> float:
     loads = wheel_loads(
         np.zeros(1), np.zeros(1), mass=plant.mass, l_f=plant.l_f, l_r=plant.l_r, h_cg=plant.h_cg, track=plant.track
     )[:, 0]
-    return float((plant.r_w * loads + plant.brake_drag / plant.r_l).sum() / loads.sum())
+    return float((plant.r_w * loads + plant.brake_drag / plant.r_e).sum() / loads.sum())
 
 
 def _undo_wheels(measured: _Columns, before: Plant, after: Plant) -> None:
@@ -222,14 +222,14 @@ def _undo_wheels(measured: _Columns, before: Plant, after: Plant) -> None:
     leak = np.clip((measured.t - after.leak_start) / after.leak_time, 0.0, 1.0)
     for i, w in enumerate(WHEELS):
         other = WHEELS.index(next(x for x in AXLES[w[0]] if x != w))
-        factor_e, factor_l = (_over_axle(r, i, other) for r in (after.r_e, after.r_l))
-        if factor_e != 1.0:
-            measured.put(f"omega_{w}", factor_e * measured.get(f"omega_{w}"))
+        factor = _over_axle(after.r_e, i, other)
+        if factor != 1.0:
+            measured.put(f"omega_{w}", factor * measured.get(f"omega_{w}"))
         if grows and (after.radius_growth[i] != 0.0 or after.leak_radius[i] != 0.0):
             ratio = effective_radius(np.ones(1), v, growth=float(after.radius_growth[i]))
             ratio = ratio * (1.0 - after.leak_radius[i] * leak)
             measured.put(f"omega_{w}", ratio * measured.get(f"omega_{w}"))
-        gain = after.torque_gain / factor_l
+        gain = after.torque_gain / factor
         if gain != 1.0:
             measured.put(f"torque_{w}", gain * measured.get(f"torque_{w}"))
 

@@ -130,7 +130,7 @@ def _sources(signals: Signals, vehicle: Vehicle) -> dict[str, FloatArray]:
         out["v_x"] = _band(signals.array("v_x"), dt, is_speed=True)
     torques = [w for w in WHEELS if f"torque_{w}" in has]
     if torques:
-        pull = np.sum([signals.array(f"torque_{w}") / vehicle.r_l(w) for w in torques], axis=0) / vehicle.mass
+        pull = np.sum([signals.array(f"torque_{w}") / vehicle.arm(w) for w in torques], axis=0) / vehicle.mass
         out["torque"] = _band(pull, dt, is_speed=False)
     return out
 

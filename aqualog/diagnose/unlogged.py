@@ -52,7 +52,7 @@ def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
     inertia = np.gradient(smooth(v, dt, SPEED_S), dt)
     force = vehicle.mass * np.maximum(np.minimum(inertia, A_MOST) + roll_out(v, vehicle), 0.0)
     rear = {"rwd": 1.0, "fwd": 0.0}.get(vehicle.drivetrain, vehicle.torque_split_rear)
-    return np.array([0.5 * (rear if w[0] == "r" else 1.0 - rear) * force * vehicle.r_l(w) for w in WHEELS])
+    return np.array([0.5 * (rear if w[0] == "r" else 1.0 - rear) * force * vehicle.arm(w) for w in WHEELS])
 
 
 def road_wheel_angle(
@@ -86,7 +86,7 @@ def brakes_in_torque(pressure: FloatArray, torque: FloatArray) -> bool:
 def brakes_unlogged(torque: FloatArray, v: FloatArray, wet: BoolArray, vehicle: Vehicle, dt: float) -> bool:
     """Whether the car often slows down much more than torque and resistance explain off the water, so by braking."""
     a = smooth(np.gradient(smooth(v, dt, SPEED_S), dt), dt, SPEED_S)
-    explained = smooth(torque.sum(axis=0), dt, SPEED_S) / (vehicle.r_l("fl") * vehicle.mass) - roll_out(v, vehicle)
+    explained = smooth(torque.sum(axis=0), dt, SPEED_S) / (vehicle.arm("fl") * vehicle.mass) - roll_out(v, vehicle)
     moving = (v > V_MIN) & ~wet
     if moving.sum() * dt < LEAST_S:
         return False

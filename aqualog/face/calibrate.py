@@ -8,12 +8,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, text_of
 from aqualog.face.drive import Drive, sources_of, vehicle_needed
 from aqualog.face.drives import DrivesLike, drives_of, load_drives, with_own_names
 from aqualog.face.listener import Progress, listener
-from aqualog.face.result import PathLike, Result, Writers, flat, rows_table, text_file
+from aqualog.face.result import PathLike, Result, Writers, bars, flat, rows_table, text_file
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -75,7 +76,8 @@ class Calibration(Result):
         return {
             "parameters": rows_table(flat(p) for p in self.document["parameters"]),
             "drives": rows_table(flat(d) for d in drives),
-            "residuals": pl.concat(residuals),
+            **({"residuals": pl.concat(residuals)} if residuals else {}),
+            **({"passes": rows_table(flat(p) for p in self.document["passes"])} if self.found.passes else {}),
         }
 
     @property
@@ -89,7 +91,7 @@ class Calibration(Result):
         return calibration_report(self.found, self.file_notes, tuple(r for _, r in self.checks))
 
     def headline(self) -> str:
-        from aqualog.report.calibration import parameter_cells
+        from aqualog.report.calibration import based_on, parameter_cells
 
         found = self.found
         known = [p for p in found.parameters if p.identified]
@@ -101,17 +103,24 @@ class Calibration(Result):
         return "\n".join(
             [
                 f"{found.vehicle_name}: {len(known)} of {len(found.parameters)} parameters estimated from "
-                f"{len(found.drives)} drives; value (95 %)",
+                f"{based_on(found)}; value (95 %)",
                 *("  " + "; ".join(values[i : i + 2]) for i in range(0, len(values), 2)),
                 *([f"  not determined: {not_found}"] if not_found else []),
             ]
         )
 
     def plot(self) -> go.Figure:
-        """Return the residual of the force balance before and after, over speed and over wheel force."""
+        """Return the residual of the force balance before and after, over speed and over wheel force.
+
+        Of passes over water, the speed at which each lost a wheel.
+        """
         from aqualog.report.calibration import balance_residuals
         from aqualog.report.figures import side_by_side
 
+        if self.found.passes:
+            lost = [3.6 * p.v_lost for p in self.found.passes if p.v_lost > 0.0]
+            named = [p.name for p in self.found.passes if p.v_lost > 0.0]
+            return bars("Passes that lost a front wheel", named, lost, "km/h")
         return side_by_side(balance_residuals(self.found))
 
     def files(self) -> Writers:
@@ -140,9 +149,10 @@ def calibrate(
     *,
     fix: Mapping[str, float] | None = None,
     accept: bool = False,
+    wet: bool = False,
     progress: Progress = None,
 ) -> Calibration:
-    """Estimate what detectors must know of a car from its dry drives.
+    """Estimate what detectors must know of a car from its dry drives, or how its tyres float from wet ones.
 
     Mass, rolling resistance, drag area, effective radii, torque gain, accelerometer offset, and the polynomials of tie
     rods and steering. The drives must be dry and with the same load; four or more show how drives differ.
@@ -155,9 +165,12 @@ def calibrate(
     vehicle : Vehicle, str or Path
         Without it that of the first drive; one of them must be given, for it says which axle is driven.
     fix : mapping, optional
-        Values that are known: `mass` [kg], `torque_gain` [-], `drag_area` [m²], `rolling_resistance` [-].
+        Values that are known: `mass` [kg], `torque_gain` [-], `drag_area` [m²], `rolling_resistance` [-]. With `wet`:
+        `tread` [mm] and `pressure` [bar], which must be given, and `depth` of the water [mm] where the logs lack it.
     accept : bool
         Take estimates in place of values that the vehicle file gives and their intervals exclude; else those stay.
+    wet : bool
+        Fit the law of water (`v_anchor`, `contact_exponent`) to passes over water from partial to full aquaplaning.
     progress : callable, optional
         Called with each step of the work, such as `print`.
 
@@ -173,12 +186,18 @@ def calibrate(
     >>> aq.detect("wet.mf4", r.vehicle)
     """
     from aqualog.calibrate.derive import check_fixed
+    from aqualog.trade.water_law import calibrate_wet, check_known
 
     hear = listener(progress)
     if not isinstance(fix, Mapping | None):
         raise TypeError(f"fix: expected a mapping of name to value, not {type(fix).__name__}")
     fixed = {text_of(n, "fix"): number_of(v, f"fix {n}", -1e9, 1e9) for n, v in (fix or {}).items()}
-    check_fixed(fixed)
+    if wet:
+        if accept:
+            raise ConfigError("accept does not apply to passes over water", expected="wet or accept")
+        check_known(fixed)
+    else:
+        check_fixed(fixed)
     (all_drives,) = with_own_names(drives_of(drives))
     car = vehicle_needed(vehicle, all_drives[0] if all_drives else None)
     loaded = load_drives(all_drives, car, hear)
@@ -187,6 +206,8 @@ def calibrate(
     def work(signals: dict[str, Signals]) -> Found:
         from aqualog.calibrate.run import calibrate as run
 
+        if wet:
+            return calibrate_wet(list(signals.values()), list(signals), car, fixed)
         return run(list(signals.values()), list(signals), car, fixed, accept=accept)
 
     found = loaded.tried(work, hear)
@@ -197,6 +218,6 @@ def calibrate(
     used, notes = tuple(loaded.used), (*loaded.notes, *loaded.changes, *sentences(checks))
     return Calibration(
         used, car, found, notes, checks, notes=(*notes, *found.notes),
-        has_loss=loaded.has_loss or bool(loaded.changes) or len(found.drives) < len(used),
+        has_loss=loaded.has_loss or bool(loaded.changes) or (not wet and len(found.drives) < len(used)),
         sources=sources_of((p for d in all_drives for p in d.sources), vehicle),
     )  # fmt: skip

@@ -102,8 +102,9 @@ class Campaign(CampaignInputs):
         Parameters
         ----------
         programme : str
-            `thesis` (the measuring campaign of the thesis), `situations` (46 situations, most without water), or a tyre
-            test: `straight-test`, `curve-test`, `braking-test`.
+            `thesis` (the measuring campaign of the thesis), `thesis-drawn` (the same, each run on tyres drawn from what
+            is known of the law of water), `situations` (46 situations, most without water), or a tyre test:
+            `straight-test`, `curve-test`, `braking-test`.
         folder : str or Path
             It is made if it does not exist.
         jobs : int, optional

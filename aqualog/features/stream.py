@@ -66,8 +66,8 @@ class FeatureStream:
         trust = 1.0 if vehicle.drivetrain == "awd" or not vehicle.knows_drivetrain else 0.25
         self._weights = np.array([trust if w in vehicle.driven else 1.0 for w in WHEELS])
         self._r_e = np.array([vehicle.r_e(w) for w in WHEELS])
-        self._r_l = np.array([vehicle.r_l(w) for w in WHEELS])
-        self._inertia = np.array([vehicle.inertia(w) for w in WHEELS])
+        self._arm = np.array([vehicle.arm(w) for w in WHEELS])
+        self._inertia = np.array([vehicle.turning_inertia(w) for w in WHEELS])
         self._steering = SteeringModel(vehicle, dt, self.available)
 
     def push(self, columns: Mapping[str, FloatArray]) -> Features:
@@ -162,7 +162,7 @@ class FeatureStream:
         """Return the force that the torque of a wheel makes; zero if the log has no torque of it. [N]"""
         name = f"torque_{WHEELS[i]}"
         torque = get[name] if name in self.available else np.zeros_like(get[name])
-        return torque / float(self._r_l[i])
+        return torque / float(self._arm[i])
 
     def _forces(
         self, get: Mapping[str, FloatArray], omega: FloatArray, loads: FloatArray, out: dict[str, FloatArray]
@@ -184,7 +184,7 @@ class FeatureStream:
         for i, wheel in enumerate(WHEELS):
             if f"torque_{wheel}" in self.available:
                 out[f"mu_{wheel}"] = traction_coefficient(
-                    torque[i], loads[i], omega_dot[i], r_l=float(self._r_l[i]), inertia=float(self._inertia[i]),
+                    torque[i], loads[i], omega_dot[i], arm=float(self._arm[i]), inertia=float(self._inertia[i]),
                     r_w=vehicle.rolling_resistance,
                 )  # fmt: skip
         # a wheel that slows down faster than the car gives its momentum to the water, not to the car: only a wheel that
@@ -194,7 +194,7 @@ class FeatureStream:
         out["torque_sum"] = torque[0] + torque[1] + torque[2] + torque[3]
         if "a_x" in self.available:
             a_nom = nominal_acceleration(
-                torque, loads, out["v_x_hat"], spinning_up, r_l=self._r_l, inertia=self._inertia, mass=vehicle.mass,
+                torque, loads, out["v_x_hat"], spinning_up, arm=self._arm, inertia=self._inertia, mass=vehicle.mass,
                 r_w=vehicle.rolling_resistance, drag_area=vehicle.drag_area, air_density=vehicle.air_density,
             )  # fmt: skip
             out["delta_a_x"] = a_nom - get["a_x"]

@@ -35,9 +35,9 @@ def driver(m, c, p, wheels, loads, warm, drag, slope_down):  # type: ignore[no-u
     """
     y, f = m.y, m.f
     split_rear = c.split_rear
-    # mean loaded radius of the driven wheels, by their share
+    # mean radius of the driven wheels, by their share
     r_drive = 0.5 * (
-        (1.0 - split_rear) * (wheels[0].r_l + wheels[1].r_l) + split_rear * (wheels[2].r_l + wheels[3].r_l)
+        (1.0 - split_rear) * (wheels[0].r_e + wheels[1].r_e) + split_rear * (wheels[2].r_e + wheels[3].r_e)
     )
     if p.has_driver > 0.0:
         # mean speed of the driven wheels

@@ -153,7 +153,7 @@ def _as_mass(share: float, car: Vehicle, _: str | None, _v: float) -> float:
 
 
 def _as_inertia(share: float, car: Vehicle, where: str | None, _: float) -> float:
-    return share * (car.mass / sum([2.0 / car.r_l(axle) ** 2 for axle in _axles(where)]))
+    return share * (car.mass / sum([2.0 / car.arm(axle) ** 2 for axle in _axles(where)]))
 
 
 def _as_wind(sd: float, car: Vehicle, _: str | None, v: float) -> float:
@@ -168,7 +168,7 @@ def _as_rolling(sd: float, car: Vehicle, where: str | None, _: float) -> float:
 
 def _as_brake(sd: float, car: Vehicle, where: str | None, _: float) -> float:
     wheels = 1 if where in WHEELS else 2 * len(_axles(where))
-    return sd * (car.mass * G * car.r_l(_axles(where)[0]) / wheels)
+    return sd * (car.mass * G * car.arm(_axles(where)[0]) / wheels)
 
 
 def _leaks(length: float) -> tuple[dict[str, float], ...]:

@@ -127,7 +127,7 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE, step: 
     road = build_road(replace(scenario, grade=()), float(speed.sum()) * step * 1.02 + 50.0)
     v, theta = float(max(speed[0], V_START)), float(grade[0])
     drag, rolling = resistance_at(plant, v, G * math.sin(theta))
-    force = float(torque[:, 0].sum()) * plant.torque_gain / float(plant.r_l.mean()) - float(rolling.sum()) - drag
+    force = float(torque[:, 0].sum()) * plant.torque_gain / float(plant.r_e.mean()) - float(rolling.sum()) - drag
     start = rolling_state(plant, v=v, a=force / (plant.mass + plant.towed_mass), drive=0.0, split_rear=0.5)
     start[DRIVE] = 0.0
     every = round(RECORD_S / step)
@@ -239,7 +239,7 @@ def replay(
     )  # fmt: skip
     drive = float(torque[0]) * plant.torque_gain
     drag, rolling = resistance_at(plant, v_0, 0.0)
-    a_0 = (drive / float(plant.r_l.mean()) - rolling.sum() - drag) / plant.mass
+    a_0 = (drive / float(plant.r_e.mean()) - rolling.sum() - drag) / plant.mass
     start = rolling_state(plant, v=v_0, a=a_0, drive=drive, split_rear=split_rear)
     rows = kernel.run(n, dt, every, start, plant, DRY, controls)
     return Replay(t, column(rows, "v_x"), column(rows, "a_x"), np.array(wheel_columns(rows, "omega")))

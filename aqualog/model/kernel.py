@@ -152,6 +152,7 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
         sum_x += forces.x
         sum_y += forces.y
         moment += forces.moment
+    _turn_driveline(m.f, wheels)
 
     # specific force: what an accelerometer shows; a trailer is pulled along
     a_x = (sum_x - drag) / (p.mass + p.towed_mass)
@@ -165,6 +166,23 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
         out[AT.steer_angle], out[AT.drive_torque], out[AT.brake_torque] = steer, command.drive, command.brake
         out[AT.grade], out[AT.lane_front], out[AT.lane_rear] = grade, front.lane, rear.lane
         out[AT.drag], out[AT.nudge] = drag, nudge
+
+
+@part
+def _turn_driveline(f, wheels):  # type: ignore[no-untyped-def]
+    """Let the wheels of each axle turn the driveline by their mean: an open differential. Changes `f`. [rad/s²]
+
+    Wheels that turn alike carry half of it each; one that spins alone a quarter, and it turns the other one back. The
+    Jacobian stays that of the wheels: of second order all the same, and too stiff rather than too soft.
+    """
+    for i in range(0, 4, 2):
+        quarter = 0.25 * wheels[i].driveline
+        if quarter > 0.0:
+            left, right = wheels[i].inertia, wheels[i + 1].inertia
+            on_left, on_right = f[OMEGA + i] * left, f[OMEGA + i + 1] * right
+            both = (left + quarter) * (right + quarter) - quarter * quarter
+            f[OMEGA + i] = ((right + quarter) * on_left - quarter * on_right) / both
+            f[OMEGA + i + 1] = ((left + quarter) * on_right - quarter * on_left) / both
 
 
 @part

@@ -45,6 +45,7 @@ class Plant(NamedTuple):
     r_l: FloatArray
     radius_growth: FloatArray
     inertia: FloatArray
+    driveline: FloatArray  # [kg·m²] turns with the mean of both wheels of an axle
     r_w: FloatArray
     warmup_extra: float
     warmup_time: float
@@ -58,20 +59,25 @@ class Plant(NamedTuple):
     relaxation_length: FloatArray
     wet_friction: FloatArray
     p: FloatArray
+    tread_depth: FloatArray
     tread_capacity: FloatArray
     half_length: FloatArray
     width: FloatArray
     v_anchor: FloatArray
+    pressure_exponent: FloatArray
+    thin_gain: FloatArray
     h_bulk: FloatArray
     h_onset: FloatArray
+    tread_gain: FloatArray
     contact_exponent: FloatArray
     contact_gain: FloatArray  # multiplies the lost contact
-    wedge_peak: FloatArray
+    wedge_arm: FloatArray
     h_film: FloatArray
     groove_relief: FloatArray
     h_wave: FloatArray
     water_drag_gain: FloatArray
     h_track: FloatArray
+    track_irregularity: FloatArray
     contact_scatter: FloatArray
     towed_mass: float  # [kg] of a trailer: pulled along, carried by its own wheels
     leak_start: float  # [s] a tyre loses its air from here on
@@ -92,8 +98,9 @@ def understeer_gradient(cornering_slope: float) -> float:
 # what a plant takes as it is from vehicle and tyres, and what is added to it, neutral at first
 _OF_CAR = ("mass", "l_f", "l_r", "h_cg", "track", "drag_area", "air_density")
 _OF_TYRES = (
-    "load_sensitivity", "wet_friction", "tread_capacity", "half_length", "width", "v_anchor", "h_bulk", "h_onset",
-    "contact_exponent", "wedge_peak", "h_film", "groove_relief", "h_wave", "h_track", "contact_scatter",
+    "load_sensitivity", "wet_friction", "tread_depth", "tread_capacity", "half_length", "width", "v_anchor",
+    "pressure_exponent", "thin_gain", "h_bulk", "h_onset", "tread_gain", "contact_exponent", "wedge_arm",
+    "h_film", "groove_relief", "h_wave", "h_track", "track_irregularity", "contact_scatter",
 )  # fmt: skip
 _ADDED = ("head_wind", "cornering_drag", "warmup_extra", "towed_mass", "leak_start")
 _ADDED_AT_WHEELS = ("radius_growth", "brake_drag", "slip_slope_drift", "relaxation_length", "leak_radius", "leak_slope")
@@ -122,7 +129,9 @@ def build_plant(
         return np.array([float(getattr(t, name)) for t in tyres])
 
     as_they_are: dict[str, Any] = {name: getattr(vehicle, name) for name in _OF_CAR}
-    as_they_are |= {name: np.array([getattr(vehicle, name)(w) for w in WHEELS]) for name in ("r_e", "r_l", "inertia")}
+    as_they_are |= {
+        name: np.array([getattr(vehicle, name)(w) for w in WHEELS]) for name in ("r_e", "r_l", "inertia", "driveline")
+    }
     as_they_are |= {name: of(name) for name in _OF_TYRES}
     nothing: dict[str, Any] = dict.fromkeys(_ADDED, 0.0) | {name: np.zeros(4) for name in _ADDED_AT_WHEELS}
     return Plant(

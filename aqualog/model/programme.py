@@ -14,6 +14,7 @@ from aqualog.model.scenario import Lane, Profile, Scenario, Steering
 from aqualog.model.situations import SITUATIONS, TUNING_POOL, Drawn, draw
 from aqualog.model.tyre import TYRES
 from aqualog.model.tyre_tests import braking_test, curve_test, straight_test
+from aqualog.model.water_numbers import drawn_tyre
 
 __all__ = ["PROGRAMMES", "SCENES", "Run", "scene", "situations", "thesis"]
 
@@ -79,9 +80,18 @@ def _of_situation(d: Drawn) -> Run:
     return Run(f"{d.name}_1", d.scenario, d.name, "", depth, given, d.believed)
 
 
+def thesis_drawn() -> tuple[Run, ...]:
+    """The thesis' programme, each run on tyres drawn from what is known of the law of water (`water_numbers`)."""
+    return tuple(replace(run, scenario=_on_drawn_tyres(run.scenario)) for run in thesis())
+
+
+def _on_drawn_tyres(s: Scenario) -> Scenario:
+    return replace(s, tyre_front=drawn_tyre(s.tyre_front, s.seed), tyre_rear=drawn_tyre(s.tyre_rear, s.seed))
+
+
 PROGRAMMES: dict[str, Callable[[], tuple[Run, ...]]] = {
-    "thesis": thesis, "situations": situations, "straight-test": straight_test, "curve-test": curve_test,
-    "braking-test": braking_test,
+    "thesis": thesis, "thesis-drawn": thesis_drawn, "situations": situations,
+    "straight-test": straight_test, "curve-test": curve_test, "braking-test": braking_test,
 }  # fmt: skip
 
 _Drive = tuple[_Case, float, float, int, str, str]
@@ -224,18 +234,19 @@ def _drive(
 
 
 def _deceleration() -> Scenario:
-    """All-wheel drive with 2 % of the torque in front, straight on, slowing down slightly from 112 km/h (C61)."""
-    lane = Lane(10.0, 15.0, depth_left=0.35e-3, depth_right=1.3e-3)
-    return _drive(SUV_REAR, ((0.0, 112 * KMH), (10.0, 112 * KMH), (18.0, 103 * KMH)), (lane,), 18.0, 3)
+    """All-wheel drive with 2 % of the torque in front, straight on, slowing down slightly from 113 km/h (C61)."""
+    lane = Lane(10.0, 15.0, depth_left=0.2e-3, depth_right=1.3e-3)
+    return _drive(SUV_REAR, ((0.0, 113 * KMH), (10.0, 113 * KMH), (18.0, 104 * KMH)), (lane,), 18.0, 3)
 
 
 def _two_accelerations() -> Scenario:
-    """All-wheel drive, straight on: rolling at 18 s, a short push before 19 s, rolling again, faster from 22.7 s (C62).
+    """All-wheel drive, straight on: rolling at 18 s, a short push before 19 s, slower again, faster from 22.6 s (C62).
 
     60 % of the torque go to the front axle.
     """
     speed: Profile = (
-        (0.0, 112 * KMH), (18.6, 112 * KMH), (19.1, 116 * KMH), (22.7, 115 * KMH), (25.0, 129 * KMH), (28.0, 129 * KMH)
+        (0.0, 113 * KMH), (18.6, 113 * KMH), (19.1, 116 * KMH), (20.8, 116 * KMH), (22.6, 110 * KMH),
+        (25.0, 129 * KMH), (28.0, 129 * KMH),
     )  # fmt: skip
     lane = Lane(17.5, 24.5, depth_left=1.3e-3, depth_right=1.3e-3)
     return _drive(SUV, speed, (lane,), 28.0, 5, split_rear=((0.0, 0.4),))
@@ -262,6 +273,6 @@ _SCENES: dict[str, Callable[[], Scenario]] = {
     "2.22": _two_accelerations,
     "2.23": _slalom,
     # below full speed: rear slip rises, minor spin-downs front right; 0.8 mm, 24 s (C72-C77)
-    "2.25": lambda: _sedan(107.0, entry_s=24.0, on_lane_s=6.0),
+    "2.25": lambda: _sedan(119.0, entry_s=24.0, on_lane_s=6.0),
 }
 SCENES = tuple(_SCENES)

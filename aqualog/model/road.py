@@ -14,7 +14,7 @@ __all__ = ["DRY", "Road", "at_position", "build_road", "stretch_at", "track_row"
 
 DS = 0.1  # [m] grid of the fields
 DS_LONG = 0.5  # [m] on drives beyond 20 km
-DEPTH_LENGTH, BUMP_LENGTH = 5.0, 0.3  # [m] correlation of the water's depth and of bumps (K)
+DEPTH_LENGTH, BUMP_LENGTH, TRACK_LENGTH = 5.0, 0.3, 1.0  # [m] correlation: depth of water, bumps, film in a track (K)
 
 
 # columns of a stretch
@@ -24,16 +24,16 @@ ROLLING, ROUGHNESS, LANE_MU, LANE_COMPLIANCE = range(7, 11)  # a negative fricti
 SURFACE_WIDTH = 4
 _LANE_WIDTH = 7 + 2 * SURFACE_WIDTH
 # columns of the fields; of sides and wheels from the left, from fl
-CONTACT_ROAD, CONTACT_WHEEL, DEPTH, BUMPS, GRADE, KICK_TORQUE, KICK_LOAD = 0, 2, 6, 8, 10, 11, 13
-_FIELD_WIDTH = 15
+CONTACT_ROAD, CONTACT_WHEEL, DEPTH, BUMPS, GRADE, KICK_TORQUE, KICK_LOAD, TRACK = 0, 2, 6, 8, 10, 11, 13, 15
+_FIELD_WIDTH = 17
 
 
 class Road(NamedTuple):
-    """Stretches (k, 15) and fields (m, 15) over the position of the front axle, from 0, `ds` apart.
+    """Stretches (k, 15) and fields (m, 17) over the position of the front axle, from 0, `ds` apart.
 
-    The last stretch of `lanes` that holds a point applies; outside all is dry asphalt. The fields of contact, depth and
-    bumps have unit variance: both axles meet `CONTACT_ROAD`, each wheel adds `CONTACT_WHEEL`. The slope angle is in
-    rad, uphill positive; kerbs and holes give torque [N·m] and wheel load [N] of either side.
+    The last stretch of `lanes` that holds a point applies; outside all is dry asphalt. The fields of contact, depth,
+    bumps and the film in a track have unit variance: both axles meet `CONTACT_ROAD`, each wheel adds `CONTACT_WHEEL`.
+    The slope angle is in rad, uphill positive; kerbs and holes give torque [N·m] and wheel load [N] of either side.
     """
 
     ds: float
@@ -66,12 +66,13 @@ def build_road(scenario: Scenario, length: float) -> Road:
         ],
         dtype=np.float64,
     ).reshape(len(scenario.lanes), _LANE_WIDTH)  # fmt: skip
-    streams = [np.random.default_rng(child) for child in np.random.SeedSequence([scenario.seed, 1]).spawn(10)]
+    streams = [np.random.default_rng(child) for child in np.random.SeedSequence([scenario.seed, 1]).spawn(12)]
     front, rear = scenario.tyre_front.scatter_length, scenario.tyre_rear.scatter_length
     fields = np.zeros((m, _FIELD_WIDTH))
     if any(lane.depth_left > 0 or lane.depth_right > 0 for lane in scenario.lanes):
         lengths = [front, front, front, front, rear, rear, DEPTH_LENGTH, DEPTH_LENGTH]
         _fill(fields, CONTACT_ROAD, streams[:8], ds, lengths)
+        _fill(fields, TRACK, streams[10:], ds, [TRACK_LENGTH, TRACK_LENGTH])
     if any(_roughness(lane) > 0 for lane in scenario.lanes):
         _fill(fields, BUMPS, streams[8:10], ds, [BUMP_LENGTH, BUMP_LENGTH])
     if scenario.grade:

@@ -139,5 +139,5 @@ class Scenario:
     drive_share: Profile = ()  # share of the driver's torque that reaches the wheels over time; empty: all of it
     antilock: bool = False  # brakes with an antilock system
     kicks: tuple[Kick, ...] = ()
-    water_scatter: float = 1.0  # scales the contact's fluctuation; 0 for an even contact
+    water_scatter: float = 1.0  # scales the fluctuation of contact and track film; 0: even
     sensors: Sensors = field(default=ESC)

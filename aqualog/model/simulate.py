@@ -201,7 +201,7 @@ def _start(plant: Plant, controls: kernel.Controls, theta: float) -> FloatArray:
     v, rear = float(controls.v_target[0]), float(controls.split_rear[0])
     a = float(controls.a_target[0]) + G * float(np.sin(theta))  # specific force
     drag, rolling = resistance_at(plant, v, a)
-    arm = 0.5 * ((1.0 - rear) * plant.r_l[:2].sum() + rear * plant.r_l[2:].sum())
+    arm = 0.5 * ((1.0 - rear) * plant.r_e[:2].sum() + rear * plant.r_e[2:].sum())
     drive = ((plant.mass + plant.towed_mass) * a + rolling.sum() + drag) * arm
     return rolling_state(plant, v=v, a=a, drive=float(drive), split_rear=rear)
 

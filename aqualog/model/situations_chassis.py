@@ -32,7 +32,7 @@ class _Motor:
     def drive(self, a: float, seconds: float, rise: float, shuffle: float = 0.0) -> None:
         """Accelerate by `a` [m/s²] for some seconds; torque rises within `rise` [s] and shuffles by a share of it."""
         now = self.torque[-1][1]
-        step = self.k.vehicle.mass * a * self.k.vehicle.r_l_r - now
+        step = self.k.vehicle.mass * a * self.k.vehicle.r_e_r - now
         f, decay = self.k.between(3.0, 7.0), self.k.between(0.2, 0.5)
         for i in range(1, 76 if shuffle else 1):
             s = 0.02 * i

@@ -128,7 +128,7 @@ def _foot_off(k: Drawing) -> Taken:
     v = _below(k, v_full, -25.0, 10.0)
     scenario, note = _through(k, depth, v, v_full, -0.4)
     t_lane, t_out = scenario.speed[2][0], scenario.speed[3][0]
-    drag = 0.015 * k.vehicle.mass * G * k.vehicle.r_l_r  # [N m] of an engine in a high gear (K)
+    drag = 0.015 * k.vehicle.mass * G * k.vehicle.r_e_r  # [N m] of an engine in a high gear (K)
     share = ((0.0, 1.0), (t_lane - 1.0, 1.0), (t_lane - 0.7, 0.0), (t_out, 0.0), (t_out + 1.0, 1.0))
     engine = ((t_lane - 1.0, 0.0), (t_lane - 0.7, -drag), (t_out, -drag), (t_out + 1.0, 0.0))
     return Taken(replace(scenario, drive_share=share, extra_torque=engine), Model(), f"{note}, foot off")
@@ -225,7 +225,7 @@ def _braking(
     v, low = k.between(70.0, 110.0) * KMH if mu > 0.5 else k.between(50.0, 80.0) * KMH, 10.0 * KMH
     a = min(demand, 0.85) * mu * G
     seconds = (v - low) / a
-    torque = demand * mu * k.vehicle.mass * G * k.vehicle.r_l_f
+    torque = demand * mu * k.vehicle.mass * G * k.vehicle.r_e_f
     start, points, brake, t = k.between(8.0, 15.0), [(0.0, v)], [(0.0, 0.0)], 0.0
     for t_0 in (start, start + seconds + 25.0):
         t = t_0 + seconds

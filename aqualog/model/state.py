@@ -56,7 +56,7 @@ def resistance_at(plant: Plant, v: float, a: float) -> tuple[float, FloatArray]:
     drag += float(np.interp(v, plant.drag_over_v[:, 0], plant.drag_over_v[:, 1]))
     drag += plant.towed_mass * G * float(plant.r_w[2])
     rolling = plant.r_w * (1.0 + plant.warmup_extra) * _loads(plant, a)
-    return drag, rolling + plant.brake_drag / plant.r_l
+    return drag, rolling + plant.brake_drag / plant.r_e
 
 
 def _loads(plant: Plant, a: float) -> FloatArray:
@@ -74,7 +74,7 @@ def rolling_state(plant: Plant, *, v: float, a: float, drive: float, split_rear:
     y[V_X], y[A_X], y[DRIVE] = v, a, drive
     _, rolling = resistance_at(plant, v, a)
     share = 0.5 * np.array([1.0 - split_rear, 1.0 - split_rear, split_rear, split_rear])
-    force = share * drive / plant.r_l - rolling
+    force = share * drive / plant.r_e - rolling
     radii = zip(plant.r_e, plant.radius_growth, strict=True)
     slip = np.clip(force / np.maximum(plant.slip_slope * _loads(plant, a), 1.0), -0.1, 0.1)
     r_e = np.array([float(effective_radius(np.array([r]), np.array([v]), growth=g)[0]) for r, g in radii])

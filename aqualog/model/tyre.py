@@ -11,13 +11,11 @@ from typing import Any
 
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Key
-from aqualog.physics.hydroplaning import Anchor, full_aquaplaning_speed
+from aqualog.physics.hydroplaning import WaterLaw, full_aquaplaning_speed
 
 __all__ = ["P_REFERENCE", "TYRES", "TYRE_KEYS", "Tyre"]
 
 P_REFERENCE = 1.9e5  # [Pa] pressure at which a vehicle file's slip slope holds, the thesis' "low"; default of scenarios
-
-H_ANCHOR, P_ANCHOR, F_Z_ANCHOR = 1.3e-3, 1.9e5, 4000.0  # [m, Pa, N] reference of a tyre's v_anchor
 
 
 def _of(unit: str, default: float, low: float, high: float, meaning: str, source: str) -> Any:
@@ -49,39 +47,46 @@ class Tyre:
     )  # fmt: skip
     width: float = _of("m", 0.205, 0.05, 0.6, "width of the contact", "205/55R16")
     v_anchor: float = _of(
-        "m/s", 125.0 / 3.6, 5.0, 100.0, "full aquaplaning of an even contact at 1.3 mm, 1.9 bar, 4 kN",
+        "m/s", 120.5 / 3.6, 5.0, 100.0, "full aquaplaning of an even contact at 1.3 mm, 1.9 bar, 4 kN, 1.6 mm of tread",
         "A: fluctuating and turning slower, 3 of 4 front wheels stop within 0.5 s at 118 km/h",
     )  # fmt: skip
+    pressure_exponent: float = _of(
+        "-", 0.3, 0.0, 1.0, "m of v_full ~ p^m", "fitted; 0.5 [horne1963], 0.3 [gallaway1979] (K)"
+    )
+    thin_gain: float = _of("-", 0.58, 0.0, 3.0, "v_full of thin films over that of bulk water, less 1", "fitted")
     h_bulk: float = _of(
-        "m", 2.0e-3, 1e-4, 0.05, "depth from which v_full falls as 1/sqrt(h)",
+        "m", 2.0e-3, 1e-4, 0.05, "depth at which bulk water begins to rule",
         "0.08 in: treaded tyres' limit (V, [gengenbach1968])",
     )  # fmt: skip
     h_onset: float = _of(
-        "m", 0.15e-3, 1e-6, 0.01, "free water that completes the wedge", "a fraction of texture depth (K)"
+        "m", 0.15e-3, 1e-6, 0.01, "free water that completes two thirds of the wedge", "a fraction of texture depth (K)"
     )  # fmt: skip
-    contact_exponent: float = _of(
-        "-", 4.0, 1.0, 12.0, "n of L = 1 - (v / v_full)^n",
-        "4-6 (D): at full - 20 km/h 0.28-0.45 of the slip slope are left",
-    )  # fmt: skip
-    wedge_peak: float = _of(
-        "-", 0.93, 0.5, 1.0, "where the water's force acts in the wedge", "a shift of 60 mm at full aquaplaning (D)"
+    tread_gain: float = _of("1/m", 33.5, 0.0, 200.0, "v_full ~ 1 + gain times the depth of the grooves", "fitted")
+    contact_exponent: float = _of("-", 3.5, 1.0, 12.0, "n of L = 1 - (v / v_full)^n", "fitted")
+    wedge_arm: float = _of(
+        "-", 0.45, 0.0, 1.5, "shift of the load at full aquaplaning over the half length",
+        "34 mm: what it takes from a rolling wheel is about the momentum of the water (D)",
     )  # fmt: skip
     h_film: float = _of(
-        "m", 0.6e-3, 0.0, 0.01, "film that the tread throws", "least depth tested; saturates by thesis Fig. 2.11 (D)"
+        "m", 0.5e-3, 0.0, 0.01, "film that the tread throws",
+        "C_D near 0.7 of a tyre that skids in 1.3 mm (K, [horne1960]); saturates by thesis Fig. 2.11",
     )  # fmt: skip
     groove_relief: float = _of("-", 0.7, 0.0, 1.0, "share of the film's drag that full drainage saves", "(K)")
     h_wave: float = _of(
         "m", 1.3e-3, 0.0, 0.05, "depth from which water is pushed ahead", "resistance rises between 1.3 and 2 mm (D)"
     )  # fmt: skip
     h_track: float = _of(
-        "m", 0.5e-3, 0.0, 0.01, "film that a front wheel leaves", "below the least depth tested, 0.6 mm (D)"
+        "m", 0.5e-3, 1e-6, 0.01, "film that a front wheel leaves of deep water",
+        "below the least depth tested, 0.6 mm (D)",
+    )  # fmt: skip
+    track_irregularity: float = _of(
+        "-", 0.3, 0.0, 2.0, "rms of that film along the road, relative", "splash and tread pattern (K)"
     )  # fmt: skip
     contact_scatter: float = _of(
-        "-", 0.06, 0.0, 0.5, "rms of v_full along the road, relative",
-        "wheel load and texture vary by 10 %, v ~ sqrt(pressure) (K)",
+        "-", 0.06, 0.0, 0.5, "rms of v_full along the road, relative", "wheel load and texture (K)"
     )  # fmt: skip
     scatter_length: float = _of(
-        "m", 2.5, 0.1, 50.0, "its correlation length", "a wheel hop of 10-12 Hz at 100 km/h (K)"
+        "m", 0.4, 0.1, 50.0, "its correlation length", "v / (2 pi f) of a wheel hop of 10-12 Hz at 100 km/h (D)"
     )  # fmt: skip
 
     @property
@@ -89,12 +94,19 @@ class Tyre:
         """Water that the grooves can take, as a depth. [m]"""
         return self.tread_depth * self.void_ratio
 
+    @property
+    def water_law(self) -> WaterLaw:
+        """The numbers of `physics.hydroplaning.full_aquaplaning_speed`."""
+        return WaterLaw(
+            self.v_anchor, self.pressure_exponent, self.thin_gain, self.h_bulk, self.h_onset, self.tread_gain,
+            self.contact_exponent,
+        )  # fmt: skip
+
     def full_speed(self, h_w: FloatArray, F_z: FloatArray, *, p: float) -> FloatArray:
         """Return the speed of full aquaplaning in even water: depth [m], wheel load [N], pressure [Pa] to [m/s]."""
         return full_aquaplaning_speed(
-            h_w, F_z, p=p, tread_capacity=self.tread_capacity,
-            anchor=Anchor(self.v_anchor, H_ANCHOR, P_ANCHOR, F_Z_ANCHOR), h_bulk=self.h_bulk, h_onset=self.h_onset,
-            exponent=self.contact_exponent,
+            h_w, F_z, p=p, tread_depth=self.tread_depth, tread_capacity=self.tread_capacity, texture=1.0,
+            law=self.water_law,
         )  # fmt: skip
 
 

@@ -26,15 +26,17 @@ from aqualog.model.road import (
     ROLLING,
     ROUGHNESS,
     SURFACE_WIDTH,
+    TRACK,
     at_position,
 )
 from aqualog.model.state import ANGLE, AT, J_V, J_W, OMEGA, SLIP_X, SLIP_Y, V_X, V_Y, YAW_RATE
-from aqualog.model.tyre import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR
 from aqualog.physics import contact, hydroplaning, kinematics, rolling, slip, steering, surface, tyre_brush, water
-from aqualog.physics.hydroplaning import Anchor
+from aqualog.physics.hydroplaning import WaterLaw
 from aqualog.physics.resistance import rolling_resistance_force
 
-__all__ = ["Body", "Command", "Ground", "Now", "Place", "ground_under", "wheel"]
+__all__ = [
+    "Body", "Command", "Contact", "Ground", "Now", "Place", "even_full_speed", "ground_under", "water_at", "wheel",
+]  # fmt: skip
 
 _wheel_velocity = inlined(kinematics.wheel_velocity)
 _bounded_slip = inlined(slip.bounded_slip)
@@ -47,6 +49,7 @@ _load_shift = inlined(contact.load_shift)
 _v_full = inlined(hydroplaning.full_aquaplaning_speed)
 _film_drag = inlined(water.film_drag)
 _wave_drag = inlined(water.wave_drag)
+_skimming_share = inlined(water.skimming_share)
 _series_slope = inlined(surface.series_slope)
 _rolling_force = inlined(rolling_resistance_force)
 _aligning_moment = inlined(steering.aligning_moment)
@@ -100,7 +103,6 @@ class _Rolling(NamedTuple):
     along: float
     across: float
     r_e: float
-    r_l: float
     rim: float
 
 
@@ -119,7 +121,7 @@ class Ground(NamedTuple):
     noise: float
 
 
-class _Water(NamedTuple):
+class Contact(NamedTuple):
     """Remaining contact and friction [-], force of film and wave [N], torque of the load's shift, full speed."""
 
     contact: float
@@ -179,7 +181,8 @@ def ground_under(i, warm, F_z, place, p, q, lanes, fields, track):  # type: igno
             uneven = 1.0 + lanes[lane, IRREGULARITY_LEFT + side] * at_position(fields, DEPTH + side, place.way, p.ds)
             film = lanes[lane, DEPTH_LEFT + side] * max(uneven, 0.0)
         else:
-            film = track[place.behind, 1 + side]
+            uneven = 1.0 + p.scatter * q.track_irregularity * at_position(fields, TRACK + side, place.way, p.ds)
+            film = track[place.behind, 1 + side] * max(uneven, 0.0)
     if p.kicks > 0.0:
         bump += at_position(fields, KICK_TORQUE + side, place.way, p.ds)
         F_z = max(F_z + at_position(fields, KICK_LOAD + side, place.way, p.ds), 0.0)
@@ -201,7 +204,7 @@ def wheel(i, now, ground, command, m, p, q):  # type: ignore[no-untyped-def]
     F_x, F_y = _brush_forces(slips.s_x, slips.s_y, ground.F_z, wet.mu, stiff.C_x, stiff.C_y, wet.contact)
     balance = _balance(i, roll, ground, wet, command, m, p, q)
     m.f[OMEGA + i] = (
-        balance.torque - F_x * roll.r_l - (balance.resisting + balance.braking) * balance.turn + ground.bump
+        balance.torque - F_x * roll.r_e - (balance.resisting + balance.braking) * balance.turn + ground.bump
     ) / q.inertia
     m.f[ANGLE + i] = roll.omega
     _jacobian(i, m, F_x, roll, slips, stiff, wet.contact, balance, p, q.inertia)
@@ -229,38 +232,48 @@ def _rolling(i, now, m, p, q):  # type: ignore[no-untyped-def]
     angle = now.steer if front else 0.0
     along, across = _wheel_velocity(m.y[V_X], m.y[V_Y], m.y[YAW_RATE], angle, x, side)
     r_e = _effective_radius(q.r_e, along, q.radius_growth) * (1.0 - q.leak_radius * now.leak)
-    r_l = q.r_l * (1.0 - q.leak_radius * now.leak)
     omega = m.y[OMEGA + i]
-    return _Rolling(x, side, omega, along, across, r_e, r_l, omega * r_e)
+    return _Rolling(x, side, omega, along, across, r_e, omega * r_e)
 
 
 @part
-def _water(roll, ground, scatter, q):  # type: ignore[no-untyped-def]
-    """Return what the water does to the contact, and its resistance."""
-    film, F_z = ground.film, ground.F_z
-    if not film > 0.0:
-        return _Water(1.0, ground.mu, 0.0, 0.0, 0.0, 1e6)
-    v_full = _v_full(
-        film, F_z, q.p, q.tread_capacity, Anchor(q.v_anchor, H_ANCHOR, P_ANCHOR, F_Z_ANCHOR), q.h_bulk, q.h_onset,
-        q.contact_exponent,
-    )  # fmt: skip
+def even_full_speed(film, F_z, q):  # type: ignore[no-untyped-def]
+    """Return the speed of full aquaplaning of a rolling wheel with the numbers `q` in an even film [m] and load [N]."""
+    law = WaterLaw(q.v_anchor, q.pressure_exponent, q.thin_gain, q.h_bulk, q.h_onset, q.tread_gain, q.contact_exponent)
+    return _v_full(film, F_z, q.p, q.tread_depth, q.tread_capacity, 1.0, law)
+
+
+@part
+def water_at(film, F_z, v_even, along, rim, mu, q):  # type: ignore[no-untyped-def]
+    """Return what water does to the contact, and its resistance.
+
+    `v_even` [m/s]: full aquaplaning of a rolling wheel here; speeds [m/s] of the wheel's centre and of its rim.
+    """
     # a wheel that has slowed down floats down to a lower speed: Horne's spin-up speed
-    rolling_share = min(max(roll.rim / max(abs(roll.along), 0.5), 0.0), 1.0)
-    v_full *= _SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * rolling_share
-    v_full *= max(1.0 + scatter * q.contact_scatter * ground.noise, 0.2)
-    lost = _lost_contact(roll.along, v_full, q.contact_exponent) * q.contact_gain
+    rolling_share = min(max(rim / max(abs(along), 0.5), 0.0), 1.0)
+    v_full = v_even * (_SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * rolling_share)
+    lost = _lost_contact(along, v_full, q.contact_exponent) * q.contact_gain
     L = 1.0 - min(max(lost, 0.0), 1.0)
     half = _half_length(F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
-    shift = _load_shift(L, half, q.wedge_peak) * F_z
-    gain = q.water_drag_gain
-    ahead = max(roll.along, 0.0)
-    film_force = gain * _film_drag(film, ahead, roll.rim, q.width, q.tread_capacity, q.h_film, q.groove_relief)
-    skid = max(roll.along - roll.rim, 0.0)  # a slower tread pushes what it no longer throws
+    shift = _load_shift(L, half, q.wedge_arm) * F_z
+    ahead = max(along, 0.0)
+    gain = q.water_drag_gain * _skimming_share(ahead, v_full)
+    film_force = gain * _film_drag(film, ahead, rim, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+    skid = max(along - rim, 0.0)  # a slower tread pushes what it no longer throws
     wave = gain * (
         _wave_drag(film, ahead, q.width, q.h_wave)
         + _film_drag(film, ahead, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
     )
-    return _Water(L, ground.mu * q.wet_friction, film_force, wave, shift, v_full)
+    return Contact(L, mu * q.wet_friction, film_force, wave, shift, v_full)
+
+
+@part
+def _water(roll, ground, scatter, q):  # type: ignore[no-untyped-def]
+    if not ground.film > 0.0:
+        return Contact(1.0, ground.mu, 0.0, 0.0, 0.0, 1e6)
+    v_even = even_full_speed(ground.film, ground.F_z, q)
+    v_even *= max(1.0 + scatter * q.contact_scatter * ground.noise, 0.2)
+    return water_at(ground.film, ground.F_z, v_even, roll.along, roll.rim, ground.mu, q)
 
 
 @part
@@ -297,11 +310,11 @@ def _slip(i, m, roll, sigma):  # type: ignore[no-untyped-def]
 def _balance(i, roll, ground, wet, command, m, p, q):  # type: ignore[no-untyped-def]
     front = i < 2
     share = 1.0 - command.split_rear if front else command.split_rear
-    torque = 0.5 * share * command.drive + (0.5 if front else -0.5) * command.excitation * roll.r_l
+    torque = 0.5 * share * command.drive + (0.5 if front else -0.5) * command.excitation * roll.r_e
     torque += m.applied[i] * p.torque_gain
     braking = q.brake_split * command.brake * (1.0 - m.released[i])
-    water_torque = wet.film_force * roll.r_l + wet.shift
-    resisting = _rolling_force(ground.F_z, ground.r_w) * roll.r_l + water_torque + q.brake_drag
+    water_torque = wet.film_force * roll.r_e + wet.shift
+    resisting = _rolling_force(ground.F_z, ground.r_w) * roll.r_e + water_torque + q.brake_drag
     # resistance fades out near standstill instead of jumping, over what one step of it can change
     standstill = max(1.0, p.dt * (resisting + braking) / q.inertia)
     turn = min(max(roll.omega / standstill, -1.0), 1.0)
@@ -313,7 +326,7 @@ def _jacobian(i, m, F_x, roll, slips, stiff, L, balance, p, inertia):  # type: i
     # the secant, not the tangent: a sliding tyre must be damped too where one step would carry it past sticking
     dF_dsx = abs(F_x) / abs(slips.s_x) if abs(slips.s_x) > 1e-9 else stiff.C_x * _stiffness_ratio(L)
     jac = m.jac
-    arm = roll.r_l / inertia
+    arm = roll.r_e / inertia
     jac[OMEGA + i] = -dF_dsx * slips.by_omega * arm
     jac[J_W + i] = -dF_dsx * slips.by_v * arm
     jac[J_V + i] = dF_dsx * slips.by_omega / p.mass

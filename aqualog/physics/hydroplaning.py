@@ -11,16 +11,23 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import FloatArray
+from aqualog.physics.water import drained_share
 
 __all__ = [
+    "CAPACITY_ANCHOR",
+    "F_Z_ANCHOR",
+    "H_ANCHOR",
+    "P_ANCHOR",
     "SPIN_UP_RATIO",
-    "Anchor",
+    "TREAD_ANCHOR",
+    "WaterLaw",
     "depth_factor",
     "full_aquaplaning_speed",
     "gallaway_speed",
     "gengenbach_speed",
     "horne_speed",
     "horne_spin_up_speed",
+    "horne_truck_speed",
     "pavdrn_speed",
     "usf_speed",
 ]
@@ -30,6 +37,9 @@ KNOT = 1852.0 / 3600.0  # [m/s]
 MPH = 0.44704  # [m/s]
 PSI = 6894.757  # [Pa]
 INCH = 0.0254  # [m]
+
+H_ANCHOR, P_ANCHOR, F_Z_ANCHOR = 1.3e-3, 1.9e5, 4000.0  # [m, Pa, N] reference of `WaterLaw.v_anchor`
+TREAD_ANCHOR, CAPACITY_ANCHOR = 1.6e-3, 0.4e-3  # [m] its worn tyre: depth of the grooves, and water that they take
 
 SPIN_UP_RATIO = 7.7 / 9.0  # spin-up over spin-down speed: a wheel that has stopped floats down to a lower speed
 
@@ -50,9 +60,7 @@ def horne_speed(p: FloatArray) -> FloatArray:
     180, 200, 220, 240 kPa give 85, 90, 94, 99 km/h. Valid for flooded roads, water deeper than the grooves.
 
     Source: Horne and Dreher, NASA TN D-2056, 1963 [horne1963]; repeated by T. J. Yager, NASA TM-85652, 1983 (K)
-    [yager1983]. Maleska et al. 2021 [maleska2021] do not confirm this equation. They apply Horne's equation for truck
-    tyres to passenger-car tyres. That one holds the aspect ratio of the footprint too, v = 7.95 sqrt(p / FAR) mph with
-    p in psi and FAR = width / length (K) [horne1986].
+    [yager1983]. Maleska et al. 2021 [maleska2021] do not confirm this equation, but `horne_truck_speed`.
     """
     return 9.0 * np.sqrt(p / PSI) * KNOT
 
@@ -65,6 +73,28 @@ def horne_spin_up_speed(p: FloatArray) -> FloatArray:
     Source: [yager1983].
     """
     return 7.7 * np.sqrt(p / PSI) * KNOT
+
+
+def horne_truck_speed(p: FloatArray, *, aspect: float) -> FloatArray:
+    """Speed of full aquaplaning by the footprint's aspect ratio, v = 7.95 sqrt(p / FAR) mph with p in psi.
+
+    Parameters
+    ----------
+    p : array
+        Inflation pressure, > 0. [Pa]
+    aspect : float
+        FAR, width over length of the footprint, > 0. [-]
+
+    Returns
+    -------
+    v : array
+        [m/s]
+
+    A longer footprint floats later. 190 kPa and 1.4 (205/55R16 at 4 kN) give 57 km/h.
+
+    Source: (K) [horne1986]; Maleska et al. 2021 [maleska2021] apply it to passenger-car tyres.
+    """
+    return 7.95 * np.sqrt(p / PSI / aspect) * MPH
 
 
 def pavdrn_speed(h_w: FloatArray) -> FloatArray:
@@ -171,37 +201,57 @@ def gengenbach_speed(h_w: FloatArray, F_z: FloatArray, *, width: float, lift_coe
     return 508.0 * np.sqrt(F_z / 9.80665 / (width * 1e3 * h_w * 1e3 * lift_coefficient)) * KMH
 
 
-def depth_factor(h_w: FloatArray | float, *, h_bulk: float) -> FloatArray | float:
-    """How full aquaplaning comes sooner in deeper water, (1 + (h / h_bulk)^2)^(-1/4).
+def depth_factor(h_w: FloatArray | float, *, thin_gain: FloatArray | float, h_bulk: float) -> FloatArray | float:
+    """How full aquaplaning comes later in thinner water, (0.82 / h^0.06 + 0.49) (1 + g / (1 + (h / h_bulk)^4)).
 
     Parameters
     ----------
     h_w : array
-        Water film, >= 0. [m]
+        Water film, > 0. [m]
+    thin_gain : array or float
+        g: how much later a film floats that the road's texture and the tread's edges break. [-]
     h_bulk : float
         Depth at which bulk water begins to rule. [m]
 
     Returns
     -------
     factor : array
-        1 for thin films, which the road's texture and the tread's edges break; ~ h^(-1/2) for deep water
-        (`gengenbach_speed`, a momentum balance). Between 0.6 and 2 mm with h_bulk = 2 mm it falls by 14 %,
-        Gallaway's by 9 %, PAVDRN's by 27 %. [-]
+        Bulk water: that of `usf_speed`, h in mm, nearly flat. Thin films: 1 + g times as much, nearly flat too. [-]
 
-    Source: derived, between [gallaway1979] and [anderson1998] for thin films; the limit for deep water is that of
-    [gengenbach1968].
+    Full aquaplaning near 118 km/h at 1.3 mm and 120 at 0.8 mm (thesis) and near 75 km/h at 5 to 8 mm (tyre tests) are
+    two regimes: no power of the depth joins them and keeps either.
+
+    Source: derived. Bulk water: [gunaratne2012]; the depth between both: 0.08 in, [gengenbach1968] as [gallaway1979]
+    quotes it; the fourth power is an assumption.
     """
     ratio = h_w / h_bulk
-    return (1.0 + ratio * ratio) ** -0.25
+    ratio = ratio * ratio
+    return (0.82 / (h_w * 1e3) ** 0.06 + 0.49) * (1.0 + thin_gain / (1.0 + ratio * ratio))
 
 
-class Anchor(NamedTuple):
-    """One measured point of full aquaplaning: speed [m/s], water [m], inflation pressure [Pa], wheel load [N]."""
+class WaterLaw(NamedTuple):
+    """Numbers of the law of full aquaplaning.
 
-    v: float
-    h_w: float
-    p: float
-    F_z: float
+    `v_anchor` [m/s]: a tyre with `TREAD_ANCHOR` on asphalt in `H_ANCHOR` at `P_ANCHOR` and `F_Z_ANCHOR`;
+    `pressure_exponent` [-]: v ~ p^m; `thin_gain` [-] and `h_bulk` [m] of `depth_factor`; `h_onset` [m]: free water that
+    completes two thirds of the wedge; `tread_gain` [1/m]: v ~ 1 + gain times the depth of the grooves; `exponent` [-]:
+    n of `lost_contact`.
+    """
+
+    v_anchor: float
+    pressure_exponent: float
+    thin_gain: float
+    h_bulk: float
+    h_onset: float
+    tread_gain: float
+    exponent: float
+
+
+def _wedge(h_w: FloatArray | float, tread_capacity: FloatArray | float, h_onset: FloatArray | float) -> FloatArray:
+    """Share of a complete wedge of water, by what finds no room in the grooves. [-]"""
+    free = h_w * (1.0 - drained_share(h_w, tread_capacity=tread_capacity))
+    wedge: FloatArray = 1.0 - np.exp(-free / h_onset)
+    return wedge
 
 
 def full_aquaplaning_speed(
@@ -209,13 +259,12 @@ def full_aquaplaning_speed(
     F_z: FloatArray,
     *,
     p: float,
+    tread_depth: float,
     tread_capacity: float,
-    anchor: Anchor,
-    h_bulk: float,
-    h_onset: float,
-    exponent: float,
+    texture: float,
+    law: WaterLaw,
 ) -> FloatArray:
-    """Speed at which the dry contact of a tyre vanishes, from one measured anchor.
+    """Speed at which the dry contact of a tyre vanishes.
 
     Parameters
     ----------
@@ -225,32 +274,33 @@ def full_aquaplaning_speed(
         Wheel load, > 0. [N]
     p : float
         Inflation pressure. [Pa]
+    tread_depth : float
+        Depth of the grooves. [m]
     tread_capacity : float
-        Water that the tread's grooves can take, as a depth. [m]
-    anchor : Anchor
-        Full aquaplaning of a tyre whose grooves take none of the anchor's water.
-    h_bulk : float
-        See `depth_factor`. [m]
-    h_onset : float
-        Free water beyond the tread's capacity at which the wedge is complete. [m]
-    exponent : float
-        n of `lost_contact`.
+        Water that the grooves can take, as a depth. [m]
+    texture : float
+        How much of what asphalt does to thin films the road does: 1 asphalt, 0 glass. [-]
+    law : WaterLaw
 
     Returns
     -------
     v_full : array
-        1e6 m/s where the tread takes all the water: no wedge. [m/s]
+        At most 1e6 m/s. [m/s]
 
-    v_anchor sqrt(p / p_anchor) (Horne) (F_z / F_z_anchor)^0.2 (USF) depth_factor(h) / depth_factor(h_anchor)
-    chi^(-1/n), where chi = (h - capacity) / h_onset within 0 ... 1 is the share of a complete wedge. Limits: v_anchor
-    at the anchor; grows with p and F_z, falls with h; h <= capacity, no aquaplaning (Gengenbach: treaded tyres none
-    below 2 mm).
+    v_anchor (p / p_anchor)^m (F_z / F_z_anchor)^0.2 times the ratios to the anchor of `depth_factor`, of 1 + k TD and
+    of chi^(-1/n). chi = 1 - exp(-h_free / h_onset) is the share of a complete wedge, and lifts that share of what a
+    complete one would. h_free = h (1 - `drained_share`) finds no room in the grooves.
+    Limits: v_anchor at the anchor; grows with p, F_z and tread, falls with h; no water, no wedge; in deep water the
+    grooves are full, and tread helps by its channels, 1 + k TD.
 
-    Source: derived. The exponent of pressure is that of [horne1963], that of load that of [gunaratne2012]; the anchor
-    is a pass of [fichtinger2024], C16; treaded tyres below 2 mm: [gengenbach1968], as [gallaway1979] quotes it.
+    Source: derived. m is 0.5 by [horne1963] and [gunaratne2012], 0.3 by [gallaway1979]; that of load is
+    [gunaratne2012]'s. The anchor is a pass of [fichtinger2024], C16. The numbers are fitted (`model/water_law.py`).
     """
-    wedge = np.minimum(np.maximum((h_w - tread_capacity) / h_onset, 0.0), 1.0)
-    depth = depth_factor(h_w, h_bulk=h_bulk) / depth_factor(anchor.h_w, h_bulk=h_bulk)
-    v = anchor.v * np.sqrt(p / anchor.p) * (np.maximum(F_z, 1.0) / anchor.F_z) ** 0.2 * depth
-    v_full: FloatArray = np.minimum(v / np.maximum(wedge, 1e-30) ** (1.0 / exponent), 1e6)
+    wedge = _wedge(h_w, tread_capacity, law.h_onset) / _wedge(H_ANCHOR, CAPACITY_ANCHOR, law.h_onset)
+    gain = texture * law.thin_gain
+    depth = depth_factor(np.maximum(h_w, 1e-9), thin_gain=gain, h_bulk=law.h_bulk)
+    depth = depth / depth_factor(H_ANCHOR, thin_gain=law.thin_gain, h_bulk=law.h_bulk)
+    channels = (1.0 + law.tread_gain * tread_depth) / (1.0 + law.tread_gain * TREAD_ANCHOR)
+    v = law.v_anchor * (p / P_ANCHOR) ** law.pressure_exponent * (np.maximum(F_z, 1.0) / F_Z_ANCHOR) ** 0.2
+    v_full: FloatArray = np.minimum(v * depth * channels / np.maximum(wedge, 1e-30) ** (1.0 / law.exponent), 1e6)
     return v_full

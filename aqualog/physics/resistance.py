@@ -66,7 +66,7 @@ def nominal_acceleration(
     v_x: FloatArray,
     omega_dot: FloatArray,
     *,
-    r_l: FloatArray,
+    arm: FloatArray,
     inertia: FloatArray,
     mass: float,
     r_w: float,
@@ -85,8 +85,8 @@ def nominal_acceleration(
         Velocity. [m/s]
     omega_dot : array (4, n)
         Angular accelerations of the wheels; zeros give the equation as printed. [rad/s²]
-    r_l, inertia : array (4,)
-        Loaded radii [m], wheel inertias [kg·m²].
+    arm, inertia : array (4,)
+        Levers of torque over force [m], wheel inertias [kg·m²].
     mass, r_w, drag_area, air_density : float
         Vehicle. [kg, -, m^2, kg/m^3]
 
@@ -99,9 +99,10 @@ def nominal_acceleration(
     Thesis [fichtinger2024]: Eq. (2.10), with the part of the torque that spins the wheels taken off (E5): without it a
     wheel that spins up by 100 rad/s² looks like 0.23 m/s² of resistance.
 
-    The lever of the torque is r_l as printed. With r_e it would agree with rolling resistance and power (E24).
+    The printed lever is r_l. r_e agrees with rolling resistance and power: a tyre without slip loss has
+    T = F_x r_e + r_w F_z r_e. 2.8 % between both are 0.077 m/s² at 2.35 m/s² (E24).
     """
-    traction = (torque - inertia[:, None] * omega_dot) / r_l[:, None]
+    traction = (torque - inertia[:, None] * omega_dot) / arm[:, None]
     rolling = rolling_resistance_force(F_z, r_w=r_w)
     drag = air_drag(v_x, drag_area=drag_area, air_density=air_density)
     a_nom: FloatArray = ((traction - rolling).sum(axis=0) - drag) / mass

@@ -14,7 +14,7 @@ DELTA_A_WATER = 0.2  # [m/s^2] thesis 2.2 (C44): less than that is no sign of wa
 
 
 def traction_coefficient(
-    torque: FloatArray, F_z: FloatArray, omega_dot: FloatArray, *, r_l: float, inertia: float, r_w: float
+    torque: FloatArray, F_z: FloatArray, omega_dot: FloatArray, *, arm: float, inertia: float, r_w: float
 ) -> FloatArray:
     """Traction coefficient mu = F_x / F_z of one wheel.
 
@@ -26,21 +26,21 @@ def traction_coefficient(
         Wheel load. [N]
     omega_dot : array (n,)
         Angular acceleration. [rad/s²]
-    r_l, inertia, r_w : float
-        Loaded radius [m], wheel inertia [kg·m²], rolling resistance coefficient [-].
+    arm, inertia, r_w : float
+        Lever of torque over force, r_e (E24) [m], wheel inertia [kg·m²], rolling resistance coefficient [-].
 
     Returns
     -------
     mu : array (n,)
         Driving positive; NaN where the wheel carries less than 100 N. [-]
 
-    F_x = (T - I omega_dot) / r_l - r_w F_z: the thesis does not say that rolling resistance and inertia come off the
+    F_x = (T - I omega_dot) / arm - r_w F_z: the thesis does not say that rolling resistance and inertia come off the
     torque of 3.14 (E13). A wheel that rolls freely at constant speed has mu = -r_w.
 
     Source: the torque balance behind Eq. (3.14) [fichtinger2024], as E13 completes it.
     """
     with np.errstate(invalid="ignore", divide="ignore"):
-        mu = (torque - inertia * omega_dot) / (r_l * F_z) - r_w
+        mu = (torque - inertia * omega_dot) / (arm * F_z) - r_w
     return np.where(F_z > 100.0, mu, np.nan)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from aqualog import __version__
-from aqualog.calibrate.records import Calibration, DriveFit, Parameter, TieRodFit
+from aqualog.calibrate.records import Calibration, DriveFit, Parameter, PassFit, TieRodFit
 from aqualog.calibrate.words import left_out
 from aqualog.core.records import FloatArray, Remark
 from aqualog.core.units import displayed_text
@@ -19,13 +19,14 @@ from aqualog.report.sections import Figures, Lines, Para, Report, Section, Table
 from aqualog.report.theme import MUTED, wheel_colour
 from aqualog.report.values import KMH, fields_of, plain, pretty_unit
 
-__all__ = ["balance_residuals", "calibration_document", "calibration_report", "parameter_cells"]
+__all__ = ["balance_residuals", "based_on", "calibration_document", "calibration_report", "parameter_cells"]
 
 _PARAMETERS = ("Parameter", "Value", "95 %", "Unit", "Vehicle file", "Remark")
 _DRIVES = (
     "Drive", "Used [s]", "Mass [kg]", "SD [kg]", "Against the others [kg]", "Offset [m/s²]", "Drift [1e-4 m/s³]",
     "Torque delay [s]", "Before [m/s²]", "After [m/s²]",
 )  # fmt: skip
+_PASSES = ("Pass", "Mean speed [km/h]", "Water [mm]", "Windows", "Wheel lost at [km/h]", "Left out")
 _MOST_DOTS = 6000
 _DOTS = (
     "Each dot is the mean of 2 s of straight, unbraked driving. It shows measured acceleration minus the acceleration "
@@ -65,6 +66,9 @@ def calibration_document(c: Calibration, *, logs: Sequence[str], notes: Sequence
         },
         "cannot_tell": list(c.cannot_tell),
         "notes": [*notes, *c.notes],
+        "passes": [
+            fields_of(p, "name", "v", "v_lost", "windows", "why", digits=None, water_depth="h_w") for p in c.passes
+        ],
     }  # fmt: skip
 
 
@@ -80,8 +84,8 @@ def calibration_report(c: Calibration, notes: Sequence[str] = (), checks: Sequen
         What does not fit among the signals.
     """
     known = [p for p in c.parameters if p.identified]
-    head = f"{c.vehicle_name}: {len(known)} of {len(c.parameters)} parameters estimated from {len(c.drives)} drives"
-    plots = {f"residual-{i}": figure for i, figure in enumerate(balance_residuals(c))}
+    head = f"{c.vehicle_name}: {len(known)} of {len(c.parameters)} parameters estimated from {based_on(c)}"
+    plots = {f"residual-{i}": figure for i, figure in enumerate(balance_residuals(c))} if c.drives else {}
     sections = [
         *input_sections(checks),
         Section("", [Para(head, where="text")]),
@@ -93,6 +97,7 @@ def calibration_report(c: Calibration, notes: Sequence[str] = (), checks: Sequen
             Table(_DRIVES, [_drive_cells(d) for d in c.drives], "drives"),
             Lines([f"{d.name}: left out {why}" for d in c.drives if (why := left_out(d.left_out))]),
         ], "drives-section"),
+        Section("Passes over water", [Table(_PASSES, [_pass_cells(p) for p in c.passes], "passes", (0, 5))]),
         *(
             Section(f"{name}: explains {fit.explained:.1%} of the variance in {fit.seconds:.0f} s", [
                 Table(("Coefficient", "Value", "95 %"), [*_coefficients(fit), ("sigma", _short(fit.sigma), "")]),
@@ -100,10 +105,25 @@ def calibration_report(c: Calibration, notes: Sequence[str] = (), checks: Sequen
             for name, fit in c.transfers.items()
         ),
         Section("Notes", [Lines([*notes, *c.notes], most=1000)], "notes", look="problems", where="page"),
-        Section("Balance of forces", [Figures(list(plots)), Para(_DOTS)], "plot-section"),
+        *([Section("Balance of forces", [Figures(list(plots)), Para(_DOTS)], "plot-section")] if plots else []),
     ]  # fmt: skip
     facts = [("vehicle", c.vehicle_name), ("estimated", f"{len(known)} of {len(c.parameters)} parameters")]
-    return Report("calibration", "calibration from dry drives", sections, facts, plots)
+    return Report(
+        "calibration", f"calibration from {'passes over water' if c.passes else 'dry drives'}", sections, facts, plots
+    )
+
+
+def based_on(c: Calibration) -> str:
+    """`4 drives`, `8 passes over water`: what the estimates rest on."""
+    used = sum(not p.why for p in c.passes)
+    return f"{used} passes over water" if c.passes else f"{len(c.drives)} drives"
+
+
+def _pass_cells(p: PassFit) -> tuple[str, ...]:
+    v, lost, depth = (
+        f"{k * x:.{d}f}" if math.isfinite(x) else "" for k, x, d in ((KMH, p.v, 1), (KMH, p.v_lost, 1), (1e3, p.h_w, 2))
+    )
+    return p.name, v, depth, str(p.windows), lost, p.why
 
 
 def parameter_cells(p: Parameter) -> tuple[str, ...]:

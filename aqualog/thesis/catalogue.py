@@ -56,7 +56,7 @@ class Row:
 
 @cache
 def rows() -> Mapping[str, Row]:
-    """All figures by number, 2.1 first."""
+    """All figures by number, 2.1 first; W.1, on what others have published, comes last."""
     text = files("aqualog.thesis").joinpath("figures.toml").read_text(encoding="utf-8")
     return {number: _row(table) for number, table in tomllib.loads(text).items()}
 
@@ -115,7 +115,7 @@ def chosen(asked: Sequence[str]) -> tuple[str, ...]:
     Parameters
     ----------
     asked : sequence of str
-        Numbers as "3.6", a chapter as "3", or "all".
+        Numbers as "3.6", a chapter as "3", "W.1" for what others have published, or "all".
 
     Raises
     ------
@@ -130,7 +130,7 @@ def chosen(asked: Sequence[str]) -> tuple[str, ...]:
         match = [n for n in NUMBERS if plain in ("all", n, n.split(".")[0])]
         if not match:
             raise ConfigError(
-                f"there is no figure {name[:40]!r}", expected="all, 2, 3 or one of 2.1 to 2.25 and 3.1 to 3.11",
+                f"there is no figure {name[:40]!r}", expected="all, 2, 3 or one of 2.1 to 2.25, 3.1 to 3.11 and W.1",
                 hint="aqualog figures 3.6 -o DIR",
             )  # fmt: skip
         found.update(match)

@@ -52,7 +52,7 @@ def render_reproduction(
     return render(
         "reproduction.html.j2", folders=(_TEMPLATES,), css=("figures.css", "reproduction.css"),
         scripts=("figures.js", "reproduction.js"),
-        title=f"{len(figures)} figures and {len(conclusions)} claims of the thesis", kind="the thesis reproduced",
+        title=f"{len(figures)} figures, {len(conclusions)} claims of the thesis", kind="the thesis reproduced",
         about="Fichtinger, TU Wien 2024, made again", missing=missing, conclusions=conclusions,
         counts=counts_of(conclusions), kinds=KINDS, facts=facts, number_of=_number_of, anchor_of=_anchor_of,
         **_drawn(figures),

@@ -71,7 +71,7 @@ def curve_passes(
     radius : float, optional
         Of the circle. [m] With it the dry lateral acceleration is checked against v^2 / R.
 
-    Source: lateral aquaplaning test of tirestesting.com; Auto Express tyre tests.
+    Source: lateral aquaplaning test of tirestesting.com; Auto Express tyre tests [autoexpress2023].
     """
     spans = spans_of(signals, lane)
     if not spans:

@@ -119,7 +119,7 @@ def straight_runs(
     depths : (float, float), optional
         Water in the left and right track [m], in place of the log's own.
 
-    Source: tyre tests of Auto Express; [maleska2021] for the influence of load, pressure and depth.
+    Source: tyre tests of Auto Express [autoexpress2023]; [maleska2021] for the influence of load, pressure and depth.
     """
     spans = spans_of(signals, lane)
     if not spans:

@@ -80,7 +80,7 @@ def _driven(
     """Speed, acceleration, force of the wheels' torque, sine of the slope: (n,) each."""
     m = CAR.mass + h["payload_mass"]
     turning = 2.0 * CAR.inertia_f / CAR.r_e_f**2 + 2.0 * CAR.inertia_r / CAR.r_e_r**2
-    rolling = m * G * (CAR.rolling_resistance + h["rolling_resistance"]) + 4.0 * h["brake_drag"] / CAR.r_l_f
+    rolling = m * G * (CAR.rolling_resistance + h["rolling_resistance"]) + 4.0 * h["brake_drag"] / CAR.r_e_f
     v, s = max(target[0], 5.0), 0.0
     rows = np.zeros((4, target.size))
     for i, wish in enumerate(target):
@@ -111,12 +111,12 @@ def _sensors(
     front = np.where(force >= 0.0, 0.0, FRONT_BRAKE)
     for w in WHEELS:
         axle = front if w[0] == "f" else 1.0 - front
-        torque = 0.5 * axle * force * CAR.r_l_r
+        torque = 0.5 * axle * force * CAR.r_e_r
         static = 0.5 * m * G * (CAR.l_r if w[0] == "f" else CAR.l_f) / CAR.wheelbase
         shift = 0.5 * m * a * CAR.h_cg / CAR.wheelbase
         F_z = static - shift if w[0] == "f" else static + shift
-        own = 0.25 * m * G * (CAR.rolling_resistance + h["rolling_resistance"]) + h["brake_drag"] / CAR.r_l_f
-        traction = torque / CAR.r_l_r - own - CAR.inertia(w) * a / CAR.r_e(w) ** 2
+        own = 0.25 * m * G * (CAR.rolling_resistance + h["rolling_resistance"]) + h["brake_drag"] / CAR.r_e_f
+        traction = torque / CAR.r_e_r - own - CAR.inertia(w) * a / CAR.r_e(w) ** 2
         slip_slope = (CAR.slip_slope_f if w[0] == "f" else CAR.slip_slope_r) * h["slip_stiffness"]
         side = 0.5 * CAR.track * (-1.0 if w[1] == "l" else 1.0)
         radius = CAR.r_e(w) * (1.0 + (h["tyre_radius_fl"] if w == "fl" else 0.0))

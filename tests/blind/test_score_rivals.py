@@ -22,7 +22,7 @@ def drive(effect=None, size=0.0, *, tau=0.0, sd=0.02, seed=1, n=2400, dt=0.1):
     t = np.arange(n) * dt
     v = 20.0 + 6.0 * np.sin(2 * np.pi * t / 47.0) + 4.0 * np.sin(2 * np.pi * t / 13.0 + seed)
     a = np.gradient(v, dt)
-    torque = CAR.r_l_r * (
+    torque = CAR.r_e_r * (
         CAR.mass * (a + 9.81 * CAR.rolling_resistance) + 0.5 * CAR.air_density * CAR.drag_area * v * v
     )
     noise = rng.normal(size=(len(CHANNELS), n))

@@ -58,7 +58,7 @@ def believed(signals, vehicle):
     """Specific force that the vehicle file expects from torques, wheel speeds and speed [m/s^2]."""
     per_wheel = [
         (signals.array(f"torque_{w}") - vehicle.inertia(w) * np.gradient(signals.array(f"omega_{w}"), 0.01))
-        / vehicle.r_l(w)
+        / vehicle.arm(w)
         for w in WHEELS
     ]
     drag = 0.5 * vehicle.air_density * vehicle.drag_area * signals.array("v_x") ** 2
@@ -118,8 +118,8 @@ def test_wheel_torque_is_what_the_tyre_and_the_rolling_take():
     rows, car = rows_of(spec), CARS["suv_awd"]
     for i, w in enumerate(WHEELS):
         spin = car.inertia(w) * np.gradient(of(rows, f"omega_{w}"), 0.01)
-        rolling = car.rolling_resistance * wheels(rows, "F_z")[i] * car.r_l(w)
-        left = of(rows, f"torque_{w}") - spin - rolling - of(rows, f"F_x_{w}") * car.r_l(w)
+        rolling = car.rolling_resistance * wheels(rows, "F_z")[i] * car.arm(w)
+        left = of(rows, f"torque_{w}") - spin - rolling - of(rows, f"F_x_{w}") * car.arm(w)
         assert np.std(left[100:]) < 0.01 * np.std(of(rows, f"torque_{w}"))
 
 
@@ -230,7 +230,7 @@ def signature(name, signals, vehicle):
     v, m = signals.array("v_x"), vehicle.mass
     rho, area = vehicle.air_density, vehicle.drag_area
     T = from_signals(signals, "torque").sum(axis=0)
-    radius = vehicle.torque_split_rear * vehicle.r_l_r + (1.0 - vehicle.torque_split_rear) * vehicle.r_l_f
+    radius = vehicle.torque_split_rear * vehicle.r_e_r + (1.0 - vehicle.torque_split_rear) * vehicle.r_e_f
     spin = np.gradient(from_signals(signals, "omega"), 0.01, axis=1).sum(axis=0)
     return {
         "aero_drag": -0.5 * rho * v**2 / m,
@@ -475,7 +475,7 @@ def test_the_driver_reacts_to_what_is_hidden():
     late = slice(4000, None)
     car = CARS["sedan_rwd"]
     v = of(nominal, "v_x")[late]
-    needed = 0.5 * car.air_density * car.drag_area * np.mean((v + 8.0) ** 2 - v**2) * car.r_l_r
+    needed = 0.5 * car.air_density * car.drag_area * np.mean((v + 8.0) ** 2 - v**2) * car.r_e_r
     more = wheels(rows, "torque").sum(axis=0)[late].mean() - wheels(nominal, "torque").sum(axis=0)[late].mean()
     assert more == pytest.approx(needed, rel=0.25)
     assert abs(np.mean(of(rows, "v_x")[late] - v)) < 0.7

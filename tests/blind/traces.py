@@ -28,7 +28,7 @@ def residuals(frame: pl.DataFrame, car: Vehicle) -> Mapping[str, FloatArray]:
     dt = BLOCK * float(frame["t"][1] - frame["t"][0])
     v = c["v_x"] if "v_x" in c else np.mean([c[f"omega_{w}"] * car.r_e(w) for w in WHEELS], axis=0)
     moving = v > V_LEAST
-    pull = np.sum([c[f"torque_{w}"] / car.r_l(w) for w in WHEELS], axis=0)
+    pull = np.sum([c[f"torque_{w}"] / car.arm(w) for w in WHEELS], axis=0)
     air = 0.5 * car.air_density * car.drag_area * v * v
     out = {
         "force": c["a_x"] - (pull - air) / car.mass,

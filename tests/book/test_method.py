@@ -74,8 +74,11 @@ def rows():
     yield "spin_down", f"| deep slip | a quarter of the speed for {s.t_deep:g} s |"
     yield "spin_down", f"| least speed | {s.v_min:g} m/s |"
     yield "spin_up", f"| threshold `spin_up` | {DEFAULT.spin_up:g} m/s |"
-    yield "spin_up", f"| traction limit | {spin.MU_SPIN_UP:g} |"
-    yield "spin_up", f"traction below {spin.MU_FULL:g} |"
+    yield (
+        "spin_up",
+        f"| traction limit | {spin.MU_SPIN_UP:g} | an event may begin only below it (thesis 2.1), for {spin.HELD_S:g} s |",
+    )
+    yield "spin_up", f"traction below {spin.MU_FULL:g} for most of the event |"
     yield "minor_spin_down", f"| threshold `minor_spin_down` | {DEFAULT.minor_spin_down:.1f} (m/s²)² |"
     yield "minor_spin_down", f"| variance of the wheel itself | {m.var_min / m.delta_min:g} times"
     yield "minor_spin_down", f"| own share | {m.share:g} |"

@@ -51,10 +51,10 @@ def made(seconds=240.0, seed=0, v=20.0, turning=0.06, accelerating=1.0, stops=0,
     for w, side in (("fl", -1), ("fr", 1), ("rl", -1), ("rr", 1)):
         columns[f"omega_{w}"] = (speed + side * 0.5 * CAR.track * yaw) / CAR.r_e(w) * (speed > 0.1)
         columns[f"omega_{w}"] += 0.05 * rng.standard_normal(n) * (speed > 0.1)
-    inertia = sum(CAR.inertia(w) / CAR.r_e(w) / CAR.r_l(w) for w in ("fl", "fr", "rl", "rr"))
+    inertia = sum(CAR.inertia(w) / CAR.r_e(w) / CAR.arm(w) for w in ("fl", "fr", "rl", "rr"))
     force = (CAR.mass + inertia) * gained + 0.5 * CAR.air_density * CAR.drag_area * speed**2 + 0.01 * CAR.mass * G
     for w in ("rl", "rr"):  # brakes are not in it
-        columns[f"torque_{w}"] = np.maximum(0.5 * force * CAR.r_l(w), -100.0) + 5.0 * rng.standard_normal(n)
+        columns[f"torque_{w}"] = np.maximum(0.5 * force * CAR.arm(w), -100.0) + 5.0 * rng.standard_normal(n)
         columns[f"omega_{w}"] *= 1.0 + force / (31.0 * 0.5 * CAR.mass * G)
     for name, offset in sensors.items():
         columns[name.removesuffix("_offset")] += offset

@@ -41,7 +41,7 @@ def found(columns, car=CAR):
 def with_torque(columns):
     """Wheel torques that explain the accelerometer without any water."""
     force = CAR.mass * columns["a_x"] + 0.5 * CAR.drag_area * CAR.air_density * 27.0**2 + 0.0105 * CAR.mass * 9.80665
-    torque = force * CAR.r_l_r / 2
+    torque = force * CAR.r_e_r / 2
     zero = np.zeros_like(torque)
     return columns | {"torque_fl": zero, "torque_fr": zero, "torque_rl": torque, "torque_rr": torque}
 

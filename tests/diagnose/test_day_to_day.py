@@ -100,10 +100,10 @@ SEEN = replace(CAR, mass=1400.0, torque_gain=0.9, drag_area=0.45, spread=SPREAD)
         ("payload_mass", "r", "delta_mass", 1400 / 30),
         ("trailer", None, "mass", 1400 / 30),
         ("trailer", None, "delta_drag_area", 0.09),
-        ("wheel_inertia", None, "delta_inertia", 1400 / 30 / 4 * CAR.r_l_f**2),
+        ("wheel_inertia", None, "delta_inertia", 1400 / 30 / 4 * CAR.r_e_f**2),
         ("head_wind", None, "speed", 2.0),  # a tenth of 20 m/s: drag goes with the square
         ("rolling_resistance", "f", "delta_r_w", 2e-3 * CAR.wheelbase / CAR.l_r),
-        ("brake_drag", "fl", "torque", 2e-3 * 1400 * 9.81 * CAR.r_l_f),
+        ("brake_drag", "fl", "torque", 2e-3 * 1400 * 9.81 * CAR.r_e_f),
         ("tyre_radius", None, "delta", 0.0),
     ],
 )
@@ -119,7 +119,7 @@ def test_the_errors_of_the_files_own_values_count_in_all_that_looks_like_them():
     ratio = np.hypot(0.03, 0.05)
     assert as_value(one("trailer"), "mass", car, 20.0) == pytest.approx(1400.0 * ratio)
     assert as_value(one("payload_mass", "r"), "delta_mass", car, 20.0) == pytest.approx(1400.0 * ratio)
-    like_load = 1400.0 * ratio / 2 * car.r_l_f**2
+    like_load = 1400.0 * ratio / 2 * car.r_e_f**2
     assert as_value(one("wheel_inertia", "f"), "delta_inertia", car, 20.0) == pytest.approx(np.hypot(like_load, 0.3))
     assert as_value(one("tyre_radius", "r"), "delta", car, 20.0) == pytest.approx(0.01)
     assert as_value(one("tyre_radius", "rl"), "delta", car, 20.0) == 0.0

@@ -189,8 +189,8 @@ def test_slip_slopes_keep_their_ratio_to_the_file(base):
 
 def test_a_torque_pulls_at_the_radius_of_its_wheel(base):
     e = extended_inputs(base, CAR, model("tyre_radius", "rl", delta=-0.08))
-    for w, radius in (("rl", 0.92 * CAR.r_l_r), ("rr", CAR.r_l_r), ("fl", CAR.r_l_f)):
-        force, expected = e.signals.array(f"torque_{w}") / e.vehicle.r_l(w), base.array(f"torque_{w}") / radius
+    for w, radius in (("rl", 0.92 * CAR.r_e_r), ("rr", CAR.r_e_r), ("fl", CAR.r_e_f)):
+        force, expected = e.signals.array(f"torque_{w}") / e.vehicle.arm(w), base.array(f"torque_{w}") / radius
         assert force == pytest.approx(expected, rel=1e-12)
 
 

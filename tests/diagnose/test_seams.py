@@ -45,7 +45,7 @@ def drive(seed=1, *, duration=240.0, lively=1.0, shifts=False, leave=(), **of):
     for w in WHEELS:
         columns[f"omega_{w}"] = seen(v, "omega", 0.01) / CAR.r_e(w)
     for w in CAR.driven:
-        columns[f"torque_{w}"] = seen(0.5 * pull * CAR.r_l(w), "torque", 5.0)
+        columns[f"torque_{w}"] = seen(0.5 * pull * CAR.arm(w), "torque", 5.0)
     kept = {n: x for n, x in columns.items() if n.split("_")[0] not in leave and n not in leave}
     frame = pl.DataFrame({"t": t, **kept}).with_columns(pl.all().fill_nan(None))
     return Signals(frame, round(DT * 1e9), None, {}, Quality(), ("log",))

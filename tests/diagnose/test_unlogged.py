@@ -26,7 +26,7 @@ def test_rolling_out_is_rolling_resistance_and_drag():
 
 def test_torque_that_is_needed_meets_resistance_and_acceleration():
     v = 20.0 + 1.5 * np.arange(0.0, 10.0, DT)
-    force = sum(x / CAR.r_l(w) for x, w in zip(needed_torque(v, CAR, DT), WHEELS, strict=True))
+    force = sum(x / CAR.arm(w) for x, w in zip(needed_torque(v, CAR, DT), WHEELS, strict=True))
     np.testing.assert_allclose(force[200:-200], CAR.mass * (1.5 + roll_out(v, CAR))[200:-200], rtol=1e-3)
     assert not needed_torque(v[::-1], CAR, DT)[:, 200:-200].any()
 

@@ -214,7 +214,7 @@ def test_coasting_slows_down_by_drag_and_rolling_resistance():
     t = np.arange(0.0, 5.0, 0.1)
     r = replay(PLANT, t, np.zeros(t.size), split_rear=1.0, v_0=30.0)
     a = -(0.5 * SEDAN.drag_area * SEDAN.air_density * 30.0**2 / SEDAN.mass + SEDAN.rolling_resistance * G)
-    inertia = sum(SEDAN.inertia(w) / (SEDAN.r_e(w) * SEDAN.r_l(w)) for w in WHEELS)
+    inertia = sum(SEDAN.inertia(w) / (SEDAN.r_e(w) * SEDAN.arm(w)) for w in WHEELS)
     assert np.diff(r.v_x)[5] / 0.1 == pytest.approx(a * SEDAN.mass / (SEDAN.mass + inertia), rel=0.02)
 
 

@@ -56,6 +56,43 @@ def test_dry_resistance_measure_is_zero(car, speed):
     assert np.abs(delta[5:-5]).max() < 0.01
 
 
+@pytest.mark.parametrize("car", CARS)
+def test_radii_3_percent_apart_are_no_resistance(car):
+    """E24: the torque of a wheel that rolls on r_e acts with r_e. (2.10) as printed books T / r_l."""
+    hard = ((0.0, 20.0), (2.0, 20.0), (8.0, 20.0 + 6.0 * 2.35))
+    apart = replace(CARS[car], r_l_f=0.97 * CARS[car].r_e_f, r_l_r=0.97 * CARS[car].r_e_r)
+    t, c = truth(scenario(apart, speed=hard, duration_s=8.0))
+    steady = (t > 4.0) & (t < 7.5)
+    assert c["a_x"][steady].mean() == pytest.approx(2.38, abs=0.04)
+    assert np.abs(resistance(t, c, scenario(apart))[steady]).max() < 0.005
+    printed = replace(apart, torque_arm="loaded")
+    assert resistance(t, c, scenario(printed))[steady].mean() == pytest.approx((1 / 0.97 - 1) * 2.6, abs=0.01)
+
+
+@pytest.mark.parametrize("car", CARS)
+def test_what_the_driveline_takes_is_no_resistance(car):
+    heavy = replace(CARS[car], driveline_inertia=4.0)
+    t, c = truth(scenario(heavy, speed=RAMP))
+    assert np.abs(resistance(t, c, scenario(heavy))[5:-5]).max() < 0.01
+    assert np.abs(resistance(t, c, scenario(CARS[car]))[(t > 5.0) & (t < 15.0)].mean()) > 0.015
+
+
+def test_a_driveline_slows_both_wheels_of_an_axle_down_and_one_alone_by_half():
+    """By hand: both by I + J / 2; one alone by I + J / 4 less what the other, which turns back, gives."""
+    f = np.zeros(state.N_STATES)
+    wheels = np.zeros(4, dtype=[("inertia", float), ("driveline", float)])
+    wheels["inertia"], wheels["driveline"] = 1.2, [0.0, 0.0, 4.0, 4.0]
+    f[state.OMEGA : state.OMEGA + 4] = 10.0
+    kernel._turn_driveline(f, wheels)
+    assert f[state.OMEGA : state.OMEGA + 4] == pytest.approx([10.0, 10.0, 10.0 * 1.2 / 3.2, 10.0 * 1.2 / 3.2])
+    f[state.OMEGA + 2 : state.OMEGA + 4] = 10.0, 0.0
+    kernel._turn_driveline(f, wheels)
+    one, other = f[state.OMEGA + 2], f[state.OMEGA + 3]
+    assert other < 0.0 < one
+    assert 1.2 * one + (one + other) == pytest.approx(12.0)  # torque on the left wheel: itself and a quarter of J
+    assert 1.2 * other + (one + other) == pytest.approx(0.0, abs=1e-12)
+
+
 def test_dry_resistance_measure_does_not_see_a_grade():
     t, c = truth(scenario(grade=((0.0, 0.0), (100.0, 0.04), (300.0, -0.03))))
     assert np.abs(resistance(t, c, scenario())[5:-5]).max() < 0.01
@@ -100,7 +137,7 @@ def energy_terms(rows, p, dt):
     )
     into = (torque * omega).sum(0)
     out = (resisting * omega).sum(0) + col(rows, "drag") * col(rows, "v_x") + (wave * v).sum(0)
-    sliding = (F_x * (p.r_l[:, None] * omega - v) - F_y * across).sum(0)  # with the torque arm r_l, as (3.29) has it
+    sliding = (F_x * (p.r_e[:, None] * omega - v) - F_y * across).sum(0)
     return stored, into, out, sliding
 
 
@@ -172,8 +209,8 @@ def test_step_halving_shows_second_order():
 
 
 def test_step_halving_on_water():
-    """Spin-downs to a stop and up again: what 1 ms gives is what 0.25 ms gives."""
-    sc = scenario(speed=((0.0, 112 / 3.6),), lanes=(lane(2.0, 6.0),), duration_s=8.0, seed=3)
+    """Spin-downs to a stop and up again: what 1 ms gives is what 0.25 ms gives, beyond the speed that decides which."""
+    sc = scenario(speed=((0.0, 114 / 3.6),), lanes=(lane(2.0, 6.0),), duration_s=8.0, seed=3)
     a, _ = raw(sc, 1e-3, 10)
     b, _ = raw(sc, 2.5e-4, 40)
     for i in range(4):
@@ -229,9 +266,18 @@ def test_rear_wheels_run_in_the_tracks_of_the_front_wheels():
     )
     t, c = truth(sc)
     assert c["true_film_fl"].max() == pytest.approx(1.3e-3, rel=0.3)
-    assert c["true_film_rl"].max() == pytest.approx(TYRES["worn_summer"].h_track, rel=1e-3)
+    h_track, rear = TYRES["worn_summer"].h_track, c["true_film_rl"]
+    assert rear[rear > 0.0] == pytest.approx(h_track * (1.0 - np.exp(-1.3e-3 / h_track)), rel=1e-3)
     front, rear = t[c["true_film_fl"] > 0][0], t[c["true_film_rl"] > 0][0]
     assert rear - front == pytest.approx(SEDAN.wheelbase / 20.0, abs=0.01)
+
+
+def test_the_film_in_a_track_has_its_own_roughness():
+    even = lane(2.0, 14.0, irregularity_left=0.0, irregularity_right=0.0)
+    _, c = truth(scenario(speed=((0.0, 20.0),), lanes=(even,), duration_s=14.0))
+    left, right = (c[f"true_film_r{s}"][4000:] for s in "lr")
+    assert left.std() / left.mean() == pytest.approx(TYRES["worn_summer"].track_irregularity, rel=0.3)
+    assert abs(np.corrcoef(left, right)[0, 1]) < 0.4
 
 
 def test_lane_in_metres_starts_where_it_says():
@@ -289,7 +335,7 @@ def test_slalom_to_two_metres_per_second_squared():
 def test_excitation_leaves_the_acceleration_alone():
     _, c = truth(scenario(AWD, speed=((0.0, 25.0),), excitation=Excitation("sine", 250.0, "force", 4.0)))
     _, plain = truth(scenario(AWD, speed=((0.0, 25.0),)))
-    assert np.ptp(c["torque_fl"]) == pytest.approx(250.0 * AWD.r_l("fl"), rel=0.02)  # +-125 N a wheel
+    assert np.ptp(c["torque_fl"]) == pytest.approx(250.0 * AWD.arm("fl"), rel=0.02)  # +-125 N a wheel
     assert np.abs(c["a_x"] - plain["a_x"]).max() < 0.01
 
 
@@ -407,11 +453,11 @@ def test_starts_in_balance_on_a_hill_too():
 
 
 def test_water_holds_a_floating_car_back():
-    """A skidding tread still pushes the film: floating does not mean rolling on."""
+    """A skidding tread still pushes the film, less than at full aquaplaning: floating does not mean rolling on."""
     sc = scenario(speed=((0.0, 145 / 3.6),), lanes=(lane(3.0, 6.0, h=1.3e-3),), water_scatter=0.0, duration_s=6.0)
     t, c = truth(sc)
     late = t > 4.5
-    assert c["true_wave_drag"][late].mean() > 300.0
+    assert c["true_wave_drag"][late].mean() > 100.0
     assert c["a_x"][late].mean() < -0.3
 
 

@@ -29,7 +29,7 @@ def drive(model=None, **kw):
 
 
 def brake(demand, at=2.0):
-    torque = demand * SEDAN.mass * G * SEDAN.r_l_f
+    torque = demand * SEDAN.mass * G * SEDAN.r_e_f
     return ((at, 0.0), (at + 0.2, torque), (at + 20.0, torque))
 
 
@@ -131,7 +131,7 @@ def test_antilock_modulates_and_does_not_lock(surface):
 
 
 def test_a_kerb_hits_front_then_rear():
-    kick = Kick(50.0, 0.4, "right", torque=300.0, load=3000.0)
+    kick = Kick(50.0, 0.4, "right", torque=310.0, load=3000.0)  # 1 kN at r_e
     c, calm = drive(kicks=(kick,)), drive()
     hit = {w: np.flatnonzero(np.abs(c[f"true_load_{w}"] - calm[f"true_load_{w}"]) > 1000.0) for w in ("fr", "rr")}
     assert c["true_position"][hit["fr"][0]] == pytest.approx(50.0, abs=0.4)

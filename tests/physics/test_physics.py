@@ -63,7 +63,7 @@ def test_wheel_loads():
 def _nominal(torque, omega_dot, v=20.0):
     loads = wheel_loads(np.zeros(1), np.zeros(1), **CAR)
     return nominal_acceleration(
-        np.array(torque)[:, None], loads, np.array([v]), np.array(omega_dot)[:, None], r_l=np.full(4, 0.3),
+        np.array(torque)[:, None], loads, np.array([v]), np.array(omega_dot)[:, None], arm=np.full(4, 0.3),
         inertia=np.full(4, 1.2), mass=1600.0, r_w=0.01, drag_area=0.7, air_density=1.2,
     )[0]  # fmt: skip
 
@@ -85,7 +85,7 @@ def test_air_drag_is_odd():
 
 
 def test_traction_coefficient():
-    kw = {"r_l": 0.3, "inertia": 1.2, "r_w": 0.01}
+    kw = {"arm": 0.3, "inertia": 1.2, "r_w": 0.01}
     F_z, zero = np.array([4000.0]), np.zeros(1)
     assert traction_coefficient(zero, F_z, zero, **kw)[0] == pytest.approx(-0.01)
     assert traction_coefficient(np.array([120.0]), F_z, zero, **kw)[0] == pytest.approx(0.1 - 0.01)

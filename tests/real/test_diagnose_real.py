@@ -101,7 +101,7 @@ def test_force_balance_of_a_calibrated_trip_does_not_grow_with_the_torque(real_l
     """A gain of 0.87 that counted twice would leave 15 % of the torque."""
     drive = prepare(trip_of(real_logs, bmw, trip), bmw, trip)
     force = residual(drive, Model())[drive.channels.index("force_balance"), drive.mask]
-    pull = drive.coordinates["torque"][drive.mask] / (bmw.r_l_r * bmw.mass)
+    pull = drive.coordinates["torque"][drive.mask] / (bmw.r_e_r * bmw.mass)
     slope = np.polyfit(pull, force, 1)[0]
     assert abs(slope) < 2.0 * bmw.spread["torque_gain"] / bmw.torque_gain
     assert (drive.coordinates["torque"][drive.mask] > 0.0).all()  # friction brakes are not in the rear torque

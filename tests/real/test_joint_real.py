@@ -29,7 +29,7 @@ def with_wheels(signals, car, seed):
     rng = np.random.default_rng(seed)
     n = signals.frame.height
     v = signals.array("v_x")
-    mu = signals.array("torque_rl") / car.r_l_r / (0.25 * car.mass * G)
+    mu = signals.array("torque_rl") / car.r_e_r / (0.25 * car.mass * G)
     columns = {}
     for w in WHEELS:
         slip = mu / SLOPE if w in car.driven else 0.0

@@ -124,7 +124,7 @@ def test_C31_roughness_that_both_axles_see_cancels():
 def test_C34_resistance_measure_is_positive_for_more_resistance():
     """2.9: delta a_x = a_x,nom - a_x,meas,ESC."""
     dry = 0.5 * CAR.drag_area * CAR.air_density * 625.0 + CAR.rolling_resistance * CAR.mass * 9.80665
-    wheel = dry * CAR.r_l("rl") / 2
+    wheel = dry * CAR.arm("rl") / 2
     torque = {"torque_rl": np.full(300, wheel), "torque_rr": np.full(300, wheel)}
     assert drive(**torque)["delta_a_x"][1:] == pytest.approx(0.0, abs=1e-9)
     f = drive(**torque, a_x=np.full(300, -0.3))
@@ -136,7 +136,7 @@ def test_C35_nominal_acceleration_by_hand():
     torque = np.array([[10.0], [20.0], [300.0], [310.0]])
     F_z = np.array([[4100.0], [4200.0], [3900.0], [3800.0]])
     a = nominal_acceleration(
-        torque, F_z, one(30.0), np.zeros((4, 1)), r_l=np.array([0.30, 0.30, 0.31, 0.31]), inertia=np.ones(4), mass=1600.0,
+        torque, F_z, one(30.0), np.zeros((4, 1)), arm=np.array([0.30, 0.30, 0.31, 0.31]), inertia=np.ones(4), mass=1600.0,
         r_w=0.01, drag_area=0.7, air_density=1.2,
     )[0]  # fmt: skip
     # 30/0.3 + 610/0.31 = 2067.742; 160 N of rolling; 378 N of drag
@@ -154,7 +154,7 @@ def test_C35_nothing_is_missing_on_a_dry_drive(a_x):
 
     omega_dot = 2 * halves(np.gradient(r.omega_f, r.t), np.gradient(r.omega_r, r.t))
     kw = {
-        "r_l": np.full(4, car.r_l_f), "inertia": np.full(4, car.inertia_f / 2), "mass": car.mass, "r_w": car.r_w,
+        "arm": np.full(4, car.r_l_f), "inertia": np.full(4, car.inertia_f / 2), "mass": car.mass, "r_w": car.r_w,
         "drag_area": car.drag_area, "air_density": car.air_density,
     }  # fmt: skip
     torque, F_z = halves(r.torque_f, r.torque_r), halves(r.F_z_f, r.F_z_r)

@@ -7,18 +7,20 @@ from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED, combin
 from aqualog.thesis.evidence.seeds import PASS_SEEDS, Plan
 
 SEEDS = tuple(range(2001, 2007))
-# the rear wheels spin up later than the front ones stop (C16); the
-# film's and the shift's drag grow with depth (C38); pressure changes the contact and with it the resistance: C43 and C45
-# cannot both hold (audit E21); a regression lies below the mean initial slope (C49); at high pressure the slope falls
-# less, so that the curves cross instead of meeting (C53)
+# three in four spin-ups begin with contact left, the criterion wants four in five (C4); in 2 mm a very worn tyre floats at
+# 102 km/h and stops, so that the lever of its load falls (C12); the rear wheels spin up later than the front ones stop
+# (C16); new winter tyres have spin-downs at 130 km/h (C19); the film's and the shift's drag grow with depth (C38); pressure
+# changes the contact and with it the resistance: C43 and C45 cannot both hold (audit E21); 0.2 m/s² are reached before the
+# contact has lost 30 % (C44); a regression lies below the mean initial slope (C49); at high pressure the slope falls less,
+# so that the curves cross instead of meeting (C53); winter tyres lose 7 % of their slope in 2 mm (C54)
 ELSE = {
-    "C16": DIFFERENCE, "C38": DIFFERENCE, "C43": NOT_REPRODUCED, "C48": DIFFERENCE,
-    "C49": DIFFERENCE, "C53": DIFFERENCE, "C55": DIFFERENCE,
+    "C4": DIFFERENCE, "C12": NOT_REPRODUCED, "C16": DIFFERENCE, "C19": NOT_REPRODUCED, "C38": DIFFERENCE,
+    "C43": NOT_REPRODUCED, "C44": DIFFERENCE, "C48": DIFFERENCE, "C49": DIFFERENCE, "C53": DIFFERENCE,
+    "C54": DIFFERENCE, "C55": DIFFERENCE,
 }  # fmt: skip
-# resistance and first dip come at the same 91 to 93 km/h (C3); one pass in four has a dip at 89 km/h (C14); two or four
-# cases of acceleration in 27 are mixed (C21); left and right differ by 0.01 (C23); the depth moves the rear slope by
-# about as much as runs scatter (C50); the interval of six seeds is wider than the 10 km/h it must lie in (C17): which side
-# they fall on is the business of the seeds
+# one pass in two has a dip at 89 km/h (C14); left and right differ by 0.01 (C23); the depth moves the rear slope by more
+# than runs scatter (C50); the interval of six seeds is wider than the 10 km/h it must lie in (C17); a few cases of
+# acceleration in 27 are mixed (C21): which side they fall on is the business of the seeds
 AT_THE_EDGE = {"C3", "C14", "C17", "C21", "C23", "C50"}
 MAKERS = {
     m.claims[0]: m.checks for module in (spins, resistance, slip_slope) for m in module.CHECKS if m.seeds == PASS_SEEDS

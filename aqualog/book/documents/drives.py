@@ -370,6 +370,16 @@ CALIBRATE = Document(
         )),
         several("cannot_tell", "what these drives cannot determine, and what would"),
         several("notes", "sentences on the logs and on the estimates"),
+        rows("passes", "with `--wet`, each pass over water", (
+            text("name", "drive, and which of its stretches of water"),
+            *or_null(
+                number("v", "m/s", "mean speed"),
+                number("v_lost", "m/s", "speed at which a front wheel was lost; null if none was"),
+                number("water_depth", "m", "water before the front wheels, mean"),
+            ),
+            count("windows", "half seconds of a front wheel that count"),
+            text("why", "why it does not count; empty if it does"),
+        )),
         DRIVE_CHECKS,
     ),
     files=("calibration.json",),

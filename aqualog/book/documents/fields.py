@@ -232,6 +232,7 @@ _EVIDENCE = (
         number("variance_max", "(m/s^2)^2", "greatest variance of that difference"),
         number("mu", "-", "traction coefficient of the wheel at the begin"),
         number("mu_min", "-", "least traction coefficient"),
+        number("mu_lost", "-", "share of the event with a traction coefficient below 0.02"),
         number("delta_a_x_max", "m/s^2", "greatest resistance measure while not braking (2.9)"),
         number("force_residual_min", "N", "least residual of the tie-rod force"),
         number("force_residual_max", "N", "greatest residual of the tie-rod force"),

@@ -13,12 +13,15 @@ from aqualog.core.vehicle import (
     POLYNOMIALS,
     SOURCES,
     SPREAD,
+    WATER,
     Provenance,
     Vehicle,
+    WaterNumber,
     vehicle_toml,
 )
 from aqualog.model.effects import EFFECTS, EMPIRICAL
 from aqualog.model.term import Effect
+from aqualog.model.tyre import TYRE_KEYS
 
 __all__ = ["EFFECTS_EXAMPLE", "effects_page", "vehicle_example", "vehicle_page"]
 
@@ -34,6 +37,12 @@ verified.
 _TEXTS = (
     ("name", "text", "the file's name", "name of the car in pages and tables"),
     ("drivetrain", "text", "none", "driven axle: rwd, fwd or awd"),
+    (
+        "torque_arm",
+        "text",
+        "effective",
+        "torque over force: effective (r_e) or loaded (r_l), as (2.10) is printed",
+    ),
 )
 _POLYNOMIALS = """
 A model of the tie-rod forces lets the detector `tie_rod` work; one of the steering torque serves cars without measured
@@ -72,6 +81,11 @@ cause, with its new value. `detect`, `simulate` and a campaign do not take them 
 "signal_delay@torque" = { delay = 0.03, spread = 0.005 }
 ```
 """
+_WATER = """
+`[water]` holds numbers of the law of water for the tyres on this car. `aqualog calibrate --wet` writes them:
+`v_anchor = { value = 33.1, sd = 0.4, source = "calibrated" }`, or a plain number. A scenario's tyres take them, unless
+the scenario gives its own.
+"""
 _PROVENANCE_SD = """
 The standard deviation of a value whose line gives none. [`[spread]`](#spread-between-drives) comes on top.
 """
@@ -105,6 +119,9 @@ def vehicle_page() -> str:
         table(("key", "unit", "default", "meaning"), _spread()),
         "## Known faults",
         _KNOWN,
+        "## How its tyres float",
+        _WATER,
+        table(("key", "unit", "default", "bounds", "meaning"), _water()),
         "## Full example",
         "Every key stands in this file. It loads as it is.",
         fence(vehicle_example(), "toml"),
@@ -120,6 +137,14 @@ def _coefficients() -> list[tuple[str, str, str, str]]:
             said = f"{_COEFFICIENTS[name]} ({meaning})" if name == "c0" else _COEFFICIENTS[name]
             rows.append((code(f"{section}.{name}"), unit, default, said))
     return rows
+
+
+def _water() -> list[tuple[str, ...]]:
+    return [
+        (code(f"water.{n}"), unit, "that of the tyre", f"{number(k.low)} ... {number(k.high)}", k.meaning)
+        for n, unit in WATER.items()
+        for k in (TYRE_KEYS[n],)
+    ]
 
 
 def _spread() -> list[tuple[str, str, str, str]]:
@@ -150,6 +175,7 @@ def vehicle_example() -> str:
             "tyre.mu_max": Provenance("guess"),
         },
         spread={"mass": 15.0, "drag_area": 0.02, "rolling_resistance": 0.0008, "torque_gain": 0.01},
+        water={"v_anchor": WaterNumber(33.1, 0.4), "contact_exponent": WaterNumber(3.2, 0.3)},
         tie_rod={"c0": (0.0,), "c_y": (0.11, 1e-6), "c_x": (0.06,), "sigma": (60.0,)},
         steering_torque={"c0": (0.0,), "c_y": (0.002,), "c_x": (0.001,), "sigma": (0.5,)},
     )

@@ -73,7 +73,7 @@ def driven_wheels(r: Scene, setup: Setup) -> tuple[Driven, ...]:
     for wheel in car.driven:
         slip = np.clip(differential_slip(f[f"v_line_{wheel}"], v_free), -SLIP_MAX, SLIP_MAX)
         # the torque's own rate: that of the traction holds the wheel's acceleration
-        pull = r.columns[f"torque_{wheel}"] / (car.r_l(wheel) * 0.25 * car.mass * G)
+        pull = r.columns[f"torque_{wheel}"] / (car.arm(wheel) * 0.25 * car.mass * G)
         rate, _ = derivative(pull, UNSET, tau=TAU_SMOOTH, dt=dt)
         reason = inactive_reason(
             v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=f["yaw_rate_slow"], a_w_delta=a_free,

@@ -65,7 +65,7 @@ def torque_traction(
         if w in vehicle.driving:
             found[f"mu_{w}"] = traction_coefficient(
                 smoothed(columns[f"torque_{w}"], width), load, np.gradient(f[f"v_line_{w}"], dt) / vehicle.r_e(w),
-                r_l=vehicle.r_l(w), inertia=vehicle.inertia(w), r_w=vehicle.rolling_resistance,
+                arm=vehicle.arm(w), inertia=vehicle.turning_inertia(w), r_w=vehicle.rolling_resistance,
             )  # fmt: skip
     return found
 

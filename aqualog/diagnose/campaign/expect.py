@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from aqualog.core.compiled import compiled, inlined
 from aqualog.core.records import FloatArray
-from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH, flat
+from aqualog.model.plant import flat
 from aqualog.model.term import Setup
-from aqualog.model.tyre import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR
-from aqualog.physics import contact, hydroplaning, load, rolling, water
+from aqualog.model.wheel import even_full_speed, water_at
+from aqualog.physics import contact, load, rolling, water
 from aqualog.physics.contact import friction_ratio
-from aqualog.physics.hydroplaning import Anchor
 from aqualog.physics.tyre_brush import brush_parts
 
 __all__ = ["NODES", "S_MAX", "Driven", "Response", "respond"]
@@ -30,7 +29,7 @@ NODES = 32  # points at which contact and depth are averaged
 S_MAX = 0.10  # [-] a wheel that slips more spins, and no regression uses it (`campaign.slip_slope`)
 _CONTACT = np.linspace(0.0, 1.0, 101)
 _SHARE = np.linspace(0.0, 0.995, 200)  # force over what the contact carries
-_PRIMES = (2, 3, 5, 7)
+_PRIMES = (2, 3, 5, 7, 11)
 
 
 class Driven(NamedTuple):
@@ -92,15 +91,8 @@ def respond(setups: Sequence[Setup], which: NDArray[np.int64], wet: NDArray[np.b
 
 _loads = inlined(load.loads_of_wheels)
 _friction_ratio = inlined(contact.friction_ratio)
-_lost_contact = inlined(contact.lost_contact)
-_half_length = inlined(contact.contact_half_length)
-_load_shift = inlined(contact.load_shift)
-_v_full = inlined(hydroplaning.full_aquaplaning_speed)
-_film_drag = inlined(water.film_drag)
-_wave_drag = inlined(water.wave_drag)
 _residual_film = inlined(water.residual_film)
 _load_factor = inlined(rolling.load_factor)
-_SPIN_UP = float(hydroplaning.SPIN_UP_RATIO)
 _FIELD_SHARE = float(np.sqrt(0.5))  # half of the contact's variance comes from the road, half from the wheel itself
 _CONTACT_STEP, _SHARE_STEP, _SHARE_MAX = float(_CONTACT[1]), float(_SHARE[1]), float(_SHARE[-1])
 
@@ -140,35 +132,28 @@ def _respond(v, a, traction, which, wet, cars, wheels, lanes, points, table):  #
             if not wet[m]:
                 slip[i, m] = _slip(traction[i, m], F_z, 1.0, q.mu, q, table)
                 continue
-            half = _half_length(F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
             count, sum_s, sum_ss, sum_L = 0, 0.0, 0.0, 0.0
             for node in range(nodes):
                 uneven = 1.0 + lanes[k, 2 + side] * points[node, 0]
-                film = left[node] if rear else lanes[k, side] * max(uneven, 0.0)
+                if rear:
+                    uneven = 1.0 + lanes[k, 4] * q.track_irregularity * points[node, 4]
+                film = (left[node] if rear else lanes[k, side]) * max(uneven, 0.0)
                 L, s, drag = 1.0, 0.0, 0.0
                 if film > 0.0:
-                    friction = q.mu * q.wet_friction
                     noise = _FIELD_SHARE * (points[node, 1] + points[node, 2 + rear])
-                    v_full = _v_full(
-                        film, F_z, q.p, q.tread_capacity, Anchor(q.v_anchor, H_ANCHOR, P_ANCHOR, F_Z_ANCHOR),
-                        q.h_bulk, q.h_onset, q.contact_exponent,
-                    )  # fmt: skip
-                    v_full *= max(1.0 + lanes[k, 4] * q.contact_scatter * noise, 0.2)
+                    v_even = even_full_speed(film, F_z, q)
+                    v_even *= max(1.0 + lanes[k, 4] * q.contact_scatter * noise, 0.2)
                     for _ in range(2):  # a wheel that has slowed down floats sooner, and slips more
-                        rolls = min(max(1.0 / (1.0 - s), 0.0), 1.0)
-                        lifted = _lost_contact(v[m], v_full * (_SPIN_UP + (1.0 - _SPIN_UP) * rolls), q.contact_exponent)
-                        L = 1.0 - min(max(lifted * q.contact_gain, 0.0), 1.0)
-                        drag = q.water_drag_gain * _film_drag(
-                            film, v[m], v[m] / (1.0 - s), q.width, q.tread_capacity, q.h_film, q.groove_relief
-                        )
-                        drag += _load_shift(L, half, q.wedge_peak) * F_z / q.r_l
+                        wet_now = water_at(film, F_z, v_even, v[m], v[m] / (1.0 - s), q.mu, q)
+                        L = wet_now.contact
+                        drag = wet_now.film_force + wet_now.shift / q.r_e
                         # the torque that the water takes at the wheel never reaches the road
-                        found = _slip(traction[i, m] - drag / F_z, F_z, L, friction, q, table)
+                        found = _slip(traction[i, m] - drag / F_z, F_z, L, wet_now.mu, q, table)
                         carries = abs(found) < S_MAX
                         s = found if carries else 0.0
                         if s >= 0.0 or not carries:
                             break
-                    drag += q.water_drag_gain * _wave_drag(film, v[m], q.width, q.h_wave)
+                    drag += wet_now.wave
                 else:
                     s = _slip(traction[i, m], F_z, 1.0, q.mu, q, table)
                     carries = abs(s) < S_MAX
@@ -206,7 +191,7 @@ def _table() -> FloatArray:
 
 @lru_cache(maxsize=1)
 def _points() -> FloatArray:
-    """Points (NODES, 4) of independent normal variables, even in space: depth, road, front and rear wheel."""
+    """Points (NODES, 5) of independent normal variables, even in space: depth, road, wheels, film in the track."""
     normal = NormalDist()
     columns = []
     for prime in _PRIMES:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.model.tyre import F_Z_ANCHOR, TYRES
+from aqualog.model.tyre import TYRES
 from aqualog.physics.contact import contact_share, friction_ratio, remaining_share, slip_stiffness_ratio
+from aqualog.physics.hydroplaning import F_Z_ANCHOR
 from aqualog.physics.tyre_brush import brush_force, brush_stiffness
 from aqualog.thesis.claims import Check, Checks, judge, limit, limits
 from aqualog.thesis.evidence.seeds import Maker, Plan, bootstrap

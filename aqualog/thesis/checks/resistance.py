@@ -307,7 +307,7 @@ def _sign(plan: Plan) -> Check:
         scenario = Scenario(car, duration_s=10.0, seed=seed, speed=((0.0, v), (10.0, v + 10.0 * a)), sensors=IDEAL)
         model = Model((Term(EFFECTS["brake_drag"], {"torque": torque}, None),))
         found.append(float(_measure(scenario, model).mean() - _measure(scenario).mean()))
-        wanted.append(4.0 * torque / car.r_l("fl") / car.mass)
+        wanted.append(4.0 * torque / car.arm("fl") / car.mass)
     gain, offset = np.polyfit(wanted, found, 1)
     left = float(np.abs(np.array(found) - wanted).max())
     whole = abs(gain - 1.0) < 0.02 and left < 0.01
@@ -329,7 +329,7 @@ def _balance(plan: Plan) -> Check:
         (sum(T[i, k] / r_l[i] - r_w * F_z[i, k] for i in range(4)) - 0.5 * 0.66 * 1.2 * v[k] ** 2) / m for k in range(n)
     ]
     ours = nominal_acceleration(
-        T, F_z, v, np.zeros((4, n)), r_l=r_l, inertia=np.ones(4), mass=m, r_w=r_w, drag_area=0.66, air_density=1.2
+        T, F_z, v, np.zeros((4, n)), arm=r_l, inertia=np.ones(4), mass=m, r_w=r_w, drag_area=0.66, air_density=1.2
     )
     worst = float(np.abs(ours - by_hand).max())
     rms, mean, spin = [], [], []
@@ -341,7 +341,7 @@ def _balance(plan: Plan) -> Check:
         mean.append(float(x.mean()))
         # as printed, without the inertia of the wheels: what 1 m/s^2 shows
         car = scenario.vehicle
-        spin.append(sum(car.inertia(w) / (car.r_e(w) * car.r_l(w)) for w in ("fl", "fr", "rl", "rr")) / car.mass)
+        spin.append(sum(car.inertia(w) / (car.r_e(w) * car.arm(w)) for w in ("fl", "fr", "rl", "rr")) / car.mass)
     right = worst < 1e-12 and max(rms) < 0.03
     outcome = (
         f"{worst:.1e} over {n} random states; rms {np.mean(rms):.4f} m/s² (largest {max(rms):.4f}) over "
@@ -359,7 +359,7 @@ def _trusted(d: Taken) -> FloatArray:
     x = f["delta_a_x"].to_numpy() - f["delta_a_x_offset"].to_numpy()
     # under braking the detector lets its sum fall: there neither way may alarm
     torque = np.array([d.signals.array(f"torque_{w}") for w in ("fl", "fr", "rl", "rr")])
-    braking = np.nan_to_num(torque.sum(axis=0)) < -0.02 * d.vehicle.mass * G * d.vehicle.r_l_f
+    braking = np.nan_to_num(torque.sum(axis=0)) < -0.02 * d.vehicle.mass * G * d.vehicle.r_e_f
     x = resistance.trusted_measure(x, f["v_x_hat"].to_numpy(), f["a_y_slow"].to_numpy(), braking)
     return np.where(np.isnan(track.statistic), np.nan, x)
 
@@ -391,7 +391,7 @@ def _not_directly(plan: Plan) -> Check:
 
 # what changes in operation: passengers and luggage; tyres from 0 to 40 degC (8 % per 10 K, [unece_r117_2011]) or soft
 # ones; a roof rack; wear of a millimetre; the air by 15 degC (K)
-_CHANGES = {"mass": 300.0, "rolling_resistance": 0.30, "drag_area": 0.10, "loaded_radius": 0.003, "air_density": 0.05}
+_CHANGES = {"mass": 300.0, "rolling_resistance": 0.30, "drag_area": 0.10, "radius": 0.003, "air_density": 0.05}
 _STATES = {"80 km/h": (80.0, 0.0), "120 km/h": (120.0, 0.0), "80 km/h, 1 m/s^2": (80.0, 1.0)}
 
 
@@ -400,7 +400,7 @@ def _nominal(car: Vehicle, torque: float, v: float, a: float) -> float:
     T = np.array([[0.0], [0.0], [0.5 * torque], [0.5 * torque]])
     nominal = nominal_acceleration(
         T, np.full((4, 1), 0.25 * car.mass * G), np.array([v]), np.full((4, 1), a / car.r_e_r),
-        r_l=np.full(4, car.r_l_r), inertia=np.full(4, car.inertia_r), mass=car.mass, r_w=car.rolling_resistance,
+        arm=np.full(4, car.arm("rr")), inertia=np.full(4, car.inertia_r), mass=car.mass, r_w=car.rolling_resistance,
         drag_area=car.drag_area, air_density=car.air_density,
     )  # fmt: skip
     return float(nominal[0])
@@ -413,8 +413,8 @@ def _parameters() -> dict[str, dict[str, float]]:
     for key, change in _CHANGES.items():
         if key == "mass":
             true = replace(car, mass=car.mass + change)
-        elif key == "loaded_radius":
-            true = replace(car, r_l_f=car.r_l_f * (1.0 + change), r_l_r=car.r_l_r * (1.0 + change))
+        elif key == "radius":
+            true = replace(car, r_e_f=car.r_e_f * (1.0 + change), r_e_r=car.r_e_r * (1.0 + change))
         else:
             true = replace(car, **{key: getattr(car, key) * (1.0 + change)})
         for state, (kmh, a) in _STATES.items():

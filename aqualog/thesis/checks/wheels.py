@@ -195,7 +195,7 @@ def _kicked(name: str, seed: int) -> Taken:
     lane = drawn.scenario.lanes[0]
     mu = lane.surface.mu or 1.0
     force = 1.5 * mu * drawn.scenario.vehicle.mass * 9.80665  # [N] beyond what any number of wheels can hold
-    torque = force * drawn.scenario.vehicle.r_l_r
+    torque = force * drawn.scenario.vehicle.r_e_r
     push = ((0.0, 0.0), (0.5, torque), (1.5, torque), (1.8, 0.0))
     kick = ((0.0, 0.0), *((start + t, x) for start in (15.0, 25.0) for t, x in push))
     scenario = replace(drawn.scenario, extra_torque=kick, duration_s=32.0)

@@ -112,8 +112,8 @@ def resistance(t: FloatArray, c: Mapping[str, FloatArray], scenario: Scenario) -
     torque = np.array([c[f"torque_{w}"] for w in WHEELS])
     omega_dot = np.array([np.gradient(c[f"omega_{w}"], t) for w in WHEELS])
     nominal = nominal_acceleration(
-        torque, loads, c["true_v_x"], omega_dot, r_l=np.array([car.r_l(w) for w in WHEELS]),
-        inertia=np.array([car.inertia(w) for w in WHEELS]), mass=mass, r_w=car.rolling_resistance,
+        torque, loads, c["true_v_x"], omega_dot, arm=np.array([car.arm(w) for w in WHEELS]),
+        inertia=np.array([car.turning_inertia(w) for w in WHEELS]), mass=mass, r_w=car.rolling_resistance,
         drag_area=car.drag_area, air_density=car.air_density,
     )  # fmt: skip
     return np.asarray(nominal - c["a_x"], dtype=np.float64)
@@ -127,8 +127,8 @@ def slip_and_traction(
     omega = c[f"omega_{wheel}"]
     s = wheel_slip(omega, c["true_v_x"], car.r_e(wheel))
     mu = traction_coefficient(
-        c[f"torque_{wheel}"], c[f"true_load_{wheel}"], np.gradient(omega, t), r_l=car.r_l(wheel),
-        inertia=car.inertia(wheel), r_w=car.rolling_resistance,
+        c[f"torque_{wheel}"], c[f"true_load_{wheel}"], np.gradient(omega, t), arm=car.arm(wheel),
+        inertia=car.turning_inertia(wheel), r_w=car.rolling_resistance,
     )  # fmt: skip
     return np.asarray(s, dtype=np.float64), np.asarray(mu, dtype=np.float64)
 
@@ -263,7 +263,7 @@ def _spins(c: Mapping[str, FloatArray], wheel: str, spinning: BoolArray) -> Floa
 
 def _demand(c: Mapping[str, FloatArray], wheel: str, scenario: Scenario) -> FloatArray:
     """Drive force minus the water's resistance, over the limit of the remaining contact, array (n,). [-]"""
-    force = (c[f"torque_{wheel}"] - c[f"true_water_torque_{wheel}"]) / scenario.vehicle.r_l(wheel)
+    force = (c[f"torque_{wheel}"] - c[f"true_water_torque_{wheel}"]) / scenario.vehicle.arm(wheel)
     residual = c[f"true_mu_max_{wheel}"] * c[f"true_load_{wheel}"]
     return np.asarray(force / np.maximum(residual, 1.0), dtype=np.float64)
 

@@ -9,8 +9,9 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH
 from aqualog.model.programme import PRESSURES
-from aqualog.model.tyre import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR, TYRES
+from aqualog.model.tyre import TYRES
 from aqualog.physics.contact import contact_half_length, contact_share, friction_ratio, load_shift, slip_stiffness_ratio
+from aqualog.physics.hydroplaning import F_Z_ANCHOR, H_ANCHOR, P_ANCHOR
 from aqualog.report.theme import INK, MUTED, WATER, wheel_colour
 from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge
@@ -67,7 +68,7 @@ def _panel(kmh: float) -> Panel:
     dry = np.linspace(-a, b, _POINTS)
     carried = LOAD * (1.0 - float(friction_ratio(np.array([L]))[0]))
     wedge = carried / ((a - b) * TYRE.width)
-    e = float(load_shift(np.array([L]), np.array([a]), peak=TYRE.wedge_peak)[0])
+    e = float(load_shift(np.array([L]), np.array([a]), arm=TYRE.wedge_arm)[0])
     mm, bar = 1e3, 1e-5
     edge = np.array([-a, *dry, b])
     height = np.array([0.0, *_parabola(dry, a), 0.0])

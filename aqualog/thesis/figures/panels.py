@@ -20,7 +20,7 @@ from aqualog.thesis.evidence.selection import Level, Selected
 from aqualog.thesis.record import Axis, Figure, Line, Panel, Table
 
 __all__ = [
-    "ALIGNED", "FRONT", "PALETTE", "V_KMH", "WHEEL_WORDS", "Style", "Window", "bit_panel", "by_seed", "clouds",
+    "ALIGNED", "FRONT", "PALETTE", "STILL", "V_KMH", "WHEEL_WORDS", "Style", "Window", "bit_panel", "by_seed", "clouds",
     "feature_lines", "means_line", "means_table", "panel", "scene_figure", "shifts", "speed_panel", "speed_panels",
     "spread_over", "styles", "tie_rod_panels",
 ]  # fmt: skip
@@ -37,6 +37,7 @@ _DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "5px", 
 _BEFORE, _AFTER = 2.0, 2.0  # [s] that are drawn before entry and after exit
 _ENTRY_S, _AFTER_S = 1.0, 1.0  # [s] the same on the common time axis, as in the thesis' Figures 2.3 and 2.5
 _LONGEST_S = 20.0  # on water that is drawn there
+STILL = -10.0  # [-] slip (3.13) of a wheel that turns at a tenth of the car's speed or less, the end of Fig. 2.4
 _MOST = 2500  # points of a cloud: what a page can hold and an eye can see
 
 Style = tuple[str, str, str]
@@ -97,7 +98,7 @@ def speed_panel(r: DriveRun, wheels: Sequence[str] = WHEELS) -> Panel:
 
 
 def speed_panels(evidence: Evidence, runs: Sequence[RunInfo]) -> list[Panel]:
-    """A panel per run, each on its own scale: wheel speeds on the centre line and velocity, in km/h."""
+    """A panel per run, all on one scale: wheel speeds on the centre line and velocity, in km/h."""
     panels = []
     for info in runs:
         r, facts = evidence.drive(info), evidence.of(info)
@@ -107,8 +108,10 @@ def speed_panels(evidence: Evidence, runs: Sequence[RunInfo]) -> list[Panel]:
         speeds["velocity"] = r.velocity[w.part] / KMH, INK, "dash"
         lines = [Line(name, w.t, y, colour=c, dash=dash, width=1.5) for name, (y, c, dash) in speeds.items()]
         kind = "constant speed" if facts.is_constant else f"{facts.a:+.1f} m/s²"
-        panels.append(_with_water(w, f"{facts.v / KMH:.0f} km/h, {kind}", ALIGNED, Axis("speed", "km/h"), lines))
-    return panels
+        panels.append((w, f"{facts.v / KMH:.0f} km/h, {kind}", lines))
+    every = np.concatenate([line.y for _, _, lines in panels for line in lines])
+    scale = Axis("speed", "km/h", limits=(float(np.nanmin(every)), float(np.nanmax(every))))
+    return [_with_water(w, title, ALIGNED, scale, lines) for w, title, lines in panels]
 
 
 def bit_panel(r: DriveRun, title: str, label: str, bits: Mapping[str, tuple[float, BoolArray, str]]) -> Panel:
@@ -205,12 +208,13 @@ def spread_over(runs: Sequence[RunInfo], evidence: Evidence, speeds: Sequence[fl
 
 
 def clouds(evidence: Evidence, runs: Sequence[RunInfo], column: str, wheels: Sequence[str]) -> list[Line]:
-    """Extremes of the slip [%] within each 0.1 s over velocity [km/h], a cloud per wheel and kind of pass.
+    """Extremes of the slip (3.13) within each 0.1 s over velocity [km/h], a cloud per wheel and kind of pass.
 
     Parameters
     ----------
     column : str
-        `slip_min` or `slip_max`: rim against car, over the car's speed.
+        `slip_min` or `slip_max`: rim against car, over the car's speed. (3.13) is over the rim's [-]; a wheel that
+        stands counts as `STILL`.
     """
     lines = []
     for kind, is_constant in (("constant speed", True), ("accelerated", False)):
@@ -219,7 +223,7 @@ def clouds(evidence: Evidence, runs: Sequence[RunInfo], column: str, wheels: Seq
             pairs = [(s.array("v_x")[wet], s.array(f"{column}_{wheel}")[wet]) for s, wet in of_kind]
             v, slip = (np.concatenate([np.empty(0), *(p[i] for p in pairs)]) for i in (0, 1))
             good = np.isfinite(v) & np.isfinite(slip)
-            v, slip = v[good] / KMH, 100.0 * slip[good]
+            v, slip = v[good] / KMH, np.maximum(slip[good] / np.maximum(1.0 + slip[good], 1e-9), STILL)
             if v.size:
                 every = slice(None, None, max(1, -(-v.size // _MOST)))
                 lines.append(

@@ -15,7 +15,7 @@ from aqualog.thesis.claims import Check, judge, limit
 from aqualog.thesis.evidence import measures
 from aqualog.thesis.evidence.campaign import KMH, Evidence, free_wheels
 from aqualog.thesis.evidence.selection import NotInCampaign, Selected, is_winter, label, value_of, wear_rank
-from aqualog.thesis.figures.panels import V_KMH, WHEEL_WORDS, clouds, speed_panels, spread_over
+from aqualog.thesis.figures.panels import STILL, V_KMH, WHEEL_WORDS, clouds, speed_panels, spread_over
 from aqualog.thesis.record import Axis, Figure, Panel
 
 __all__ = ["FIGURES"]
@@ -159,7 +159,8 @@ def new_tread(found: Sequence[Pass], words: str) -> Check | None:
     return judge("C19.figure", outcome, whole=hit == 0, part=part, value=share, ci95=(low, high), fields=fields)
 
 
-_BELOW = (29.0, 20.0, 12.0, 0.0)  # [km/h] below full aquaplaning: the thesis' 89, 98, 106 and 118 km/h
+_SHOWN = (89.0, 98.0, 106.0, 118.0)  # [km/h] of the thesis, in its configuration
+_BELOW = tuple(_SHOWN[-1] - v for v in _SHOWN)  # [km/h] the same below full aquaplaning, in any other
 
 
 def figure_2_03(number: str, evidence: Evidence) -> Figure:
@@ -171,8 +172,11 @@ def figure_2_03(number: str, evidence: Evidence) -> Figure:
         raise NotInCampaign(f"needs {needs_of(number)}: {len(constant)} in {selected.fixed}", where=f"figure {number}")
     v_full = measures.full_speed(found)
     top = v_full if np.isfinite(v_full) else max(p.v_mean for p in found)
-    shown = spread_over(constant, evidence, [top - b * KMH for b in _BELOW])
-    what = "the speed at which half of the passes have a full spin-down" if np.isfinite(v_full) else "the fastest pass"
+    speeds = [v * KMH for v in _SHOWN] if selected.is_thesis else [top - b * KMH for b in _BELOW]
+    shown = spread_over(constant, evidence, speeds)
+    listed = ", ".join(f"{v / KMH:.0f}" for v in speeds)
+    half = f"half of the passes have a full spin-down at {top / KMH:.0f} km/h"
+    what = half if np.isfinite(v_full) else f"the fastest pass has {top / KMH:.0f} km/h"
     at_89 = at_118 = None
     if selected.is_thesis:
         at_89 = _shares(found, 89.0, measures.has_minor, "C14", "with minor spin-downs of a free wheel")
@@ -181,7 +185,7 @@ def figure_2_03(number: str, evidence: Evidence) -> Figure:
     counted = {r.index: "drawn, and counted" if r in shown else "counted" for r in selected.runs}
     return figure_of(
         number, speed_panels(evidence, shown), checks, runs=selected.used(counted), fixed=selected.fixed,
-        top=top / KMH, what=what,
+        speeds=listed, what=what,
     )  # fmt: skip
 
 
@@ -207,7 +211,7 @@ def figure_2_04(number: str, evidence: Evidence) -> Figure:
             "needs wheel speeds and the car's speed on water: no slip in any pass", where=f"figure {number}"
         )
     found = measures.passes_of(evidence, selected.runs)
-    panel = Panel("Slip of the free wheels", V_KMH, Axis("slip", "%"), tuple(lines))
+    panel = Panel("Slip of the free wheels", V_KMH, Axis("slip (3.13)", limits=(1.05 * STILL, 0.5)), tuple(lines))
     checks = (before_full(found), exponential(found), _deep(evidence, selected))
     return figure_of(number, (panel,), checks, runs=selected.used(), fixed=selected.fixed)
 

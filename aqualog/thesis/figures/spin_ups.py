@@ -185,7 +185,7 @@ def figure_2_06(number: str, evidence: Evidence) -> Figure:
         raise NotInCampaign(
             "needs wheel speeds and the car's speed on water: no slip in any pass", where=f"figure {number}"
         )
-    panel = Panel("Slip of the driven wheels", V_KMH, Axis("slip", "%"), tuple(lines))
+    panel = Panel("Slip of the driven wheels", V_KMH, Axis("slip (3.13)"), tuple(lines))
     checks = (far_below(evidence, selected.runs), irregular(evidence, selected.runs))
     return figure_of(
         number, (panel,), checks, runs=selected.used(_with_or_without(selected, spun)), fixed=selected.fixed,

@@ -137,7 +137,7 @@ def _traction(drive: Drive) -> dict[str, FloatArray]:
     for w in WHEELS:
         axle = f"torque_{w[0]}"
         if axle in c:
-            force = 0.5 * filled(c[axle]) * car.torque_gain / car.r_l(w)
+            force = 0.5 * filled(c[axle]) * car.torque_gain / car.arm(w)
         elif any(n.startswith("torque_") for n in c):
             force = np.zeros(c["t"].size)
         else:
@@ -161,7 +161,7 @@ def _pulled(drive: Drive, force: FloatArray, own: Mapping[str, FloatArray] | Non
     out: Columns = {}
     for axle, share in (("f", 1.0 - rear), ("r", rear)):
         if f"torque_{axle}" in c:
-            out[f"torque_{axle}"] = c[f"torque_{axle}"] + force * share * car.r_l(f"{axle}l") / car.torque_gain
+            out[f"torque_{axle}"] = c[f"torque_{axle}"] + force * share * car.arm(f"{axle}l") / car.torque_gain
     if "omega_fl" not in c:
         return out
     before, loads = _traction(drive), _loads(drive)
@@ -198,7 +198,7 @@ def _rolling(d: Drive, v: Values, _: str | None) -> Columns:
 def _brake(d: Drive, v: Values, where: str | None) -> Columns:
     n = d.columns["t"].size
     at = WHEELS if where is None else (where,)
-    own = {w: np.full(n, v["torque"] / d.vehicle.r_l(w) if w in at else 0.0) for w in WHEELS}
+    own = {w: np.full(n, v["torque"] / d.vehicle.arm(w) if w in at else 0.0) for w in WHEELS}
     return _pulled(d, np.sum(list(own.values()), axis=0), own)
 
 

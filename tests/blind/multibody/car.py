@@ -229,8 +229,7 @@ def gradients(car: Car) -> tuple[float, float]:
 def vehicle_file(car: Car, drivetrain: str, rng: np.random.Generator) -> Vehicle:
     """What a calibration of the car on a mean day would write, with the errors that it leaves."""
     roll, area = _constant_and_square(car)
-    # a file has the radius as measured under load as the lever of forces, so a calibration finds a gain of its share
-    inertia = PRESSED * (car.rim + car.belt)[[0, 2]]
+    inertia = (car.rim + car.belt)[[0, 2]]
 
     def off(name: str, x: float) -> float:
         return round(float(x * (1.0 + FILE_ERRORS[name] * rng.standard_normal())), 6)
@@ -241,7 +240,7 @@ def vehicle_file(car: Car, drivetrain: str, rng: np.random.Generator) -> Vehicle
     return Vehicle(
         name="car", drivetrain=drivetrain, mass=mass, l_f=l_f, l_r=round(base - l_f, 6),  # type: ignore[arg-type]
         h_cg=off("h_cg", car.h_cg), track=off("track", car.track), drag_area=drag, air_density=car.air_density,
-        rolling_resistance=rolling, torque_split_rear=car.split_rear, torque_gain=off("torque_gain", PRESSED * car.torque_gain), r_e_f=r_e[0], r_e_r=r_e[1],
+        rolling_resistance=rolling, torque_split_rear=car.split_rear, torque_gain=off("torque_gain", car.torque_gain), r_e_f=r_e[0], r_e_r=r_e[1],
         r_l_f=off("r_l", PRESSED * car.r_e[0]), r_l_r=off("r_l", PRESSED * car.r_e[2]), inertia_f=off("inertia", inertia[0]),
         inertia_r=off("inertia", inertia[1]), slip_slope_f=off("slip_slope", _secant(car, 0)),
         slip_slope_r=off("slip_slope", _secant(car, 2)), mu_max=off("mu_max", car.mu[0]),

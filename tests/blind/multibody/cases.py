@@ -175,7 +175,7 @@ def residuals(messages: list[Message], vehicle: Vehicle, block: int, seconds: fl
     v, gain = x["v_x"], vehicle.torque_gain
     rim = {w: x[f"omega_{w}"] * vehicle.r_e(w) for w in WHEELS}
     pull = sum(
-        (gain * x[f"torque_{w}"] - vehicle.inertia(w) * np.gradient(x[f"omega_{w}"], DT)) / vehicle.r_l(w)
+        (gain * x[f"torque_{w}"] - vehicle.inertia(w) * np.gradient(x[f"omega_{w}"], DT)) / vehicle.arm(w)
         for w in WHEELS
     )
     drag = 0.5 * vehicle.air_density * vehicle.drag_area * v**2
@@ -189,7 +189,7 @@ def residuals(messages: list[Message], vehicle: Vehicle, block: int, seconds: fl
         slope = vehicle.slip_slope_f if w[0] == "f" else vehicle.slip_slope_r
         along = v - x["yaw_rate"] * side
         turn = vehicle.inertia(w) * np.gradient(x[f"omega_{w}"], DT)
-        out[f"slip_{w}"] = rim[w] - along * (1.0 + (gain * x[f"torque_{w}"] - turn) / (vehicle.r_l(w) * slope * load))
+        out[f"slip_{w}"] = rim[w] - along * (1.0 + (gain * x[f"torque_{w}"] - turn) / (vehicle.arm(w) * slope * load))
     out["lateral"] = x["a_y"] - v * x["yaw_rate"]
     moving = v > 2.0
     return {n: _blocks(np.where(moving, r, 0.0), block) for n, r in out.items()}

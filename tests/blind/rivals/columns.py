@@ -41,7 +41,7 @@ def named_columns(r: Residuals, vehicle: Vehicle) -> dict[str, np.ndarray]:
     Channels: accelerometer against torque, accelerometer against wheels, speed of each wheel against the reference.
     """
     v, a, torque, t = (r.coordinates[n] for n in ("v_x", "a_x", "torque", "t"))
-    m, radius = vehicle.mass, vehicle.r_l_r
+    m, radius = vehicle.mass, vehicle.r_e_r
     q = vehicle.air_density * v / m
     late = np.gradient(a, r.dt)
     share = {w: _share(vehicle, w) for w in WHEELS}
@@ -89,7 +89,7 @@ def _share(vehicle: Vehicle, wheel: str) -> float:
     slope = vehicle.slip_slope_r if wheel[0] == "r" else vehicle.slip_slope_f
     arm = vehicle.l_f if wheel[0] == "r" else vehicle.l_r
     load = 0.5 * vehicle.mass * G * arm / vehicle.wheelbase
-    return own / (vehicle.r_l(wheel) * load * slope)
+    return own / (vehicle.arm(wheel) * load * slope)
 
 
 def scales(r: Residuals) -> np.ndarray:

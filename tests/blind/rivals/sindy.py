@@ -44,7 +44,7 @@ def polynomials(r: Residuals, vehicle: Vehicle) -> dict[str, np.ndarray]:
 
 
 def _inputs(r: Residuals, vehicle: Vehicle) -> tuple[np.ndarray, np.ndarray]:
-    return r.coordinates["v_x"] / _V, r.coordinates["torque"] / (vehicle.r_l_r * vehicle.mass)
+    return r.coordinates["v_x"] / _V, r.coordinates["torque"] / (vehicle.r_e_r * vehicle.mass)
 
 
 def single(r: Residuals, vehicle: Vehicle, threshold: float) -> Finding:

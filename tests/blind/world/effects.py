@@ -194,7 +194,7 @@ EFFECTS: dict[str, Callable[[World, Values, str | None], World]] = {
     "slip_stiffness": _of_tyre("slope", "gain", factor=True),
     "slip_stiffness_drift": _of_tyre("slope_drift", "rate", factor=False),
     "load_sensitivity": _of_tyre("load_delta", "delta", factor=False),
-    "tyre_radius": lambda w, v, where: _tyre(w, where, factor={"r_e": 1.0 + v["delta"], "r_l": 1.0 + v["delta"]}),
+    "tyre_radius": lambda w, v, where: _tyre(w, where, factor={"r_e": 1.0 + v["delta"]}),
     "pressure_loss": _pressure,
     "tyre_radius_growth": _of_tyre("growth", "growth", factor=False),
     "relaxation_length": _of_tyre("relaxation", "length", factor=False),

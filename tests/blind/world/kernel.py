@@ -45,7 +45,7 @@ SPLIT, BRAKE_F, POWER, R_DRIVE = (CAR[n] for n in ("split_rear", "brake_front", 
 KIND = CAR["tyre_kind"]
 PITCH_HZ, PITCH_D, FILM = (CAR[n] for n in ("pitch_hz", "pitch_damping", "track_film"))
 HABIT_M, HABIT_D, HABIT_R, SHIFTS = (CAR[n] for n in ("habit_mass", "habit_drag", "habit_r_w", "shifts"))
-R_E, R_L, GROWTH, INERTIA, R_W, BRAKE_DRAG = (TYRE[n] for n in ("r_e", "r_l", "growth", "inertia", "r_w", "brake_drag"))
+R_E, GROWTH, INERTIA, R_W, BRAKE_DRAG = (TYRE[n] for n in ("r_e", "growth", "inertia", "r_w", "brake_drag"))
 SLOPE, SLOPE_DRIFT, LOAD_DELTA, F_REF, MU = (TYRE[n] for n in ("slope", "slope_drift", "load_delta", "F_ref", "mu"))
 RELAX, WATER, CONTACT = (TYRE[n] for n in ("relaxation", "water_gain", "contact_gain"))
 LEAK_R, LEAK_S, CORNERING, SIDE_Y = (TYRE[n] for n in ("leak_radius", "leak_slope", "cornering", "side_y"))
@@ -111,7 +111,6 @@ def _rhs(t, y, f, out, keep, p, w, road, ds, drive, brake, steer, gust):
             along, across = u_x, u_y
         omega = y[OMEGA + i]
         r_e = w[i, R_E] * (1.0 + w[i, GROWTH] * along * along) * (1.0 - w[i, LEAK_R] * leak)
-        r_l = w[i, R_L] * (1.0 - w[i, LEAK_R] * leak)
         rim = omega * r_e
         # water
         film = front_left if left else front_right
@@ -129,7 +128,7 @@ def _rhs(t, y, f, out, keep, p, w, road, ds, drive, brake, steer, gust):
             mu *= WET_FRICTION * contact * contact * (3.0 - 2.0 * contact)
             force = water_force(along, film) * w[i, WATER]
             wave = WAVE_SHARE * force
-            tread = (1.0 - WAVE_SHARE) * force * r_l + F_z * WEDGE * lost**1.8
+            tread = (1.0 - WAVE_SHARE) * force * r_e + F_z * WEDGE * lost**1.8
         # tyre
         slope = w[i, SLOPE] * (1.0 + w[i, LEAK_S] * leak) * exp(w[i, SLOPE_DRIFT] * t)
         slope *= load_law(F_z, w[i, F_REF], w[i, LOAD_DELTA]) * contact * contact
@@ -156,8 +155,8 @@ def _rhs(t, y, f, out, keep, p, w, road, ds, drive, brake, steer, gust):
         driven = share_d * drive
         reported = driven - share_b * brake * tanh(omega / 0.5)
         torque = p[GAIN] * reported - p[GEAR_LOSS] * max(driven, 0.0) ** 2
-        resist = w[i, R_W] * warm * F_z * r_l + w[i, BRAKE_DRAG] + tread
-        f[OMEGA + i] = (torque - F_x * r_l - resist * tanh(omega / 1.5)) / w[i, INERTIA]
+        resist = w[i, R_W] * warm * F_z * r_e + w[i, BRAKE_DRAG] + tread
+        f[OMEGA + i] = (torque - F_x * r_e - resist * tanh(omega / 1.5)) / w[i, INERTIA]
         f[ANGLE + i] = omega
         # body
         pull = F_x - wave

@@ -57,7 +57,7 @@ def shape_of(hidden: Hidden, vehicle: Vehicle) -> Shape | None:
     if hidden.effect == "gear_loss":
         r = vehicle.torque_split_rear
         squares = 0.5 * (r * r + (1.0 - r) ** 2) * v["coefficient"] / m
-        radius = r * vehicle.r_l_r + (1.0 - r) * vehicle.r_l_f
+        radius = r * vehicle.r_e_r + (1.0 - r) * vehicle.r_e_f
         return Shape("force_balance", ("torque",), lambda T: -squares * np.maximum(T, 0.0) ** 2 / radius)
     if hidden.effect == "accelerometer_speed":
         return Shape(

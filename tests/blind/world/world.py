@@ -25,7 +25,7 @@ CAR = {name: i for i, name in enumerate((
     "habit_drag", "habit_r_w", "shifts", "r_drive", "tyre_kind",
 ))}  # fmt: skip
 TYRE = {name: i for i, name in enumerate((
-    "r_e", "r_l", "growth", "inertia", "r_w", "brake_drag", "slope", "slope_drift", "load_delta", "F_ref", "mu",
+    "r_e", "growth", "inertia", "r_w", "brake_drag", "slope", "slope_drift", "load_delta", "F_ref", "mu",
     "relaxation", "water_gain", "contact_gain", "leak_radius", "leak_slope", "cornering", "side_y",
 ))}  # fmt: skip
 
@@ -73,7 +73,7 @@ def nominal_world(vehicle: Vehicle, tyre_kind: str = "magic") -> World:
         "split_rear": v.torque_split_rear, "brake_front": 0.64, "power": 115.0 * v.mass, "pitch_hz": 1.6,
         "pitch_damping": 0.35, "track_film": 0.5e-3, "habit_mass": v.mass, "habit_drag": 0.5 * v.drag_area * 1.2,
         "habit_r_w": v.rolling_resistance, "shifts": 0.0 if v.name.startswith("electric") else 1.0,
-        "r_drive": (1.0 - v.torque_split_rear) * v.r_l_f + v.torque_split_rear * v.r_l_r,
+        "r_drive": (1.0 - v.torque_split_rear) * v.r_e_f + v.torque_split_rear * v.r_e_r,
         "tyre_kind": KINDS[tyre_kind],
     }  # fmt: skip
     for name, x in values.items():
@@ -82,7 +82,7 @@ def nominal_world(vehicle: Vehicle, tyre_kind: str = "magic") -> World:
     for i, wheel in enumerate(WHEELS):
         front = wheel[0] == "f"
         axle = {
-            "r_e": v.r_e(wheel), "r_l": v.r_l(wheel), "inertia": v.inertia(wheel), "r_w": v.rolling_resistance,
+            "r_e": v.r_e(wheel), "inertia": v.inertia(wheel), "r_w": v.rolling_resistance,
             "slope": slope * (v.slip_slope_f if front else v.slip_slope_r),
             "F_ref": 0.5 * v.mass * G * (v.l_r if front else v.l_f) / base, "mu": v.mu_max, "water_gain": 1.0,
             "contact_gain": 1.0, "cornering": slope * (16.0 if front else 20.0),

@@ -224,9 +224,9 @@ def test_traction_of_one_axle_is_that_of_the_torque():
     force = (c.mass + 2.0 * c.inertia_f / c.r_e_f**2) * a_kin + c.mass * G * grade + drag
     force = force + c.rolling_resistance * load[:2].sum(axis=0)
     omega_dot = a_kin / c.r_e_r
-    torque = 0.5 * force * c.r_l_r + c.inertia_r * omega_dot + c.rolling_resistance * load[2] * c.r_l_r
+    torque = 0.5 * force * c.r_e_r + c.inertia_r * omega_dot + c.rolling_resistance * load[2] * c.r_e_r
     expected = traction_coefficient(
-        torque, load[2], omega_dot, r_l=c.r_l_r, inertia=c.inertia_r, r_w=c.rolling_resistance
+        torque, load[2], omega_dot, arm=c.r_e_r, inertia=c.inertia_r, r_w=c.rolling_resistance
     )
     assert mu[0] == pytest.approx(expected, rel=1e-12)
     assert mu[1] == pytest.approx(expected, rel=1e-12)

@@ -380,3 +380,19 @@ def test_pictures_without_a_browser_say_what_is_needed(monkeypatch):
 def test_a_campaign_figure_needs_a_campaign():
     with pytest.raises(ConfigError, match="--campaign"):
         make("2.17")
+
+
+def test_passes_over_time_are_those_of_the_thesis_on_one_scale():
+    for number in ("2.3", "2.5"):
+        panels = made_of_campaign(number).panels
+        assert len({p.y.limits for p in panels}) == 1
+        low, high = panels[0].y.limits
+        assert all(np.nanmin(line.y) >= low and np.nanmax(line.y) <= high for p in panels for line in p.lines)
+    assert "nearest to 89, 98, 106, 118 km/h" in made_of_campaign("2.3").caption
+
+
+def test_slips_of_the_free_wheels_are_those_of_3_13():
+    (panel,) = made_of_campaign("2.4").panels
+    slips = np.concatenate([line.y for line in panel.lines])
+    assert slips.min() >= -10.0
+    assert panel.y.limits == (-10.5, 0.5)

@@ -27,10 +27,11 @@ from tests.thesis.made import all_made, check, made
 
 
 def test_rows_of_all_figures():
-    assert len(catalogue.NUMBERS) == 36
+    assert len(catalogue.NUMBERS) == 36 + 1  # W.1 is not of the thesis
     assert set(catalogue.NUMBERS) == {*catalogue.WITHOUT, *catalogue.OF_CAMPAIGN}
-    for row in rows().values():
-        assert all((row.title, row.caption, row.claims))
+    for number, row in rows().items():
+        assert all((row.title, row.caption))
+        assert bool(row.claims) == (number != "W.1")
         assert bool(row.needs) == ("campaign" in row.made_from)
         assert bool(row.log) == ("logs" in row.made_from)
 
@@ -90,12 +91,13 @@ def test_words():
 def test_numbers_that_are_asked_for():
     assert catalogue.chosen(["3.11", "3.2", "3.2"]) == ("3.2", "3.11")
     assert catalogue.chosen(["3.06"]) == ("3.6",)
-    assert catalogue.chosen(["all"]) == catalogue.chosen(["3", "2"]) == catalogue.NUMBERS
+    assert catalogue.chosen(["all"]) == catalogue.chosen(["W", "3", "2"]) == catalogue.NUMBERS
+    assert catalogue.chosen(["W.1"]) == ("W.1",)
     assert catalogue.chosen(["3"]) == tuple(f"3.{n}" for n in range(1, 12))
     assert catalogue.chosen(["2"]) == tuple(f"2.{n}" for n in range(1, 26))
     assert catalogue.chosen(["2.09", "2.8"]) == ("2.8", "2.9")
     for wrong in ("2.26", "2.0"):
-        with pytest.raises(ConfigError, match=rf"no figure '{wrong}'.*2\.1 to 2\.25 and 3\.1 to 3\.11"):
+        with pytest.raises(ConfigError, match=rf"no figure '{wrong}'.*2\.1 to 2\.25, 3\.1 to 3\.11 and W\.1"):
             catalogue.chosen([wrong])
     with pytest.raises(ConfigError, match=r"2\.3: needs the runs of a campaign.*--campaign"):
         make("2.3")

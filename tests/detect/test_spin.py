@@ -1,0 +1,66 @@
+"""Large spins of one wheel: when an alarm may begin, and how severe a spin-up is."""
+
+import numpy as np
+import pytest
+
+from aqualog.core.records import Track
+from aqualog.detect.events import EventBook
+from aqualog.detect.spin import HELD_S, SPIN_DOWN, SPIN_UP, SpinParams, initial_state, scan
+
+DT = 0.01
+N = 100
+
+
+def spin(sign, allowed):
+    """A wheel that gains (loses) 20 m/s² from 0.2 s on for 0.5 s; bits of the detector."""
+    t = np.arange(N) * DT
+    a = np.where((t >= 0.2) & (t < 0.7), 20.0, 0.0)
+    dv = np.cumsum(a) * DT
+    p, v = SpinParams.make(sign, DT), np.full(N, 25.0)
+    whole = scan(p, initial_state(), sign * a, sign * dv, v, allowed)[1]
+    for cut in (1, 25, 33, 60):
+        state, bits = initial_state(), []
+        for part in (slice(None, cut), slice(cut, None)):
+            _, own, state = scan(p, state, sign * a[part], sign * dv[part], v[part], allowed[part])
+            bits.append(own)
+        assert np.array_equal(np.concatenate(bits), whole)
+    return whole
+
+
+@pytest.mark.parametrize(("length", "begins"), [(0.5 * HELD_S, False), (2.0 * HELD_S, True)])
+def test_a_spin_up_needs_lost_traction_for_a_while(length, begins):
+    """On snow the traction passes the limit for a moment while the driver goes from braking to driving (C27)."""
+    t = np.arange(N) * DT
+    allowed = (t >= 0.4) & (t < 0.4 + length)
+    assert spin(1.0, allowed).any() == begins
+
+
+def test_a_spin_down_does_not_wait():
+    bits = spin(-1.0, np.ones(N, dtype=bool))
+    assert bits.any()
+    first = np.flatnonzero(bits)[0]
+    alone = np.zeros(N, dtype=bool)
+    alone[first] = True
+    assert spin(-1.0, alone)[first]
+
+
+def test_a_spin_up_is_full_where_the_traction_is_lost_for_most_of_it():
+    assert SPIN_UP.severity({"mu_lost": 0.6, "mu_min": -0.1}) == "full"
+    assert SPIN_UP.severity({"mu_lost": 0.4, "mu_min": -0.9}) == "partial"  # one moment of changing torque
+    assert SPIN_UP.severity({}) == "partial"
+    assert SPIN_DOWN.severity({"slip_min": -0.3}) == "full"
+
+
+@pytest.mark.parametrize("cuts", [(), (5,), (3, 4, 17)])
+def test_shares_are_the_same_however_a_drive_is_cut(cuts):
+    bits = np.zeros(30, dtype=bool)
+    bits[2:22] = True
+    lost = np.where(np.arange(30) % 3 == 0, 1.0, 0.0)
+    lost[6] = np.nan
+    book, events = EventBook(10_000_000), []
+    for part in np.split(np.arange(30), cuts):
+        track = Track("spin_up", "rl", None, "m/s", np.ones(part.size), 0.6, bits[part])
+        events += book.take(track, {"mu_lost": ("share", lost[part])}, SPIN_UP.severity)
+    events += book.finish()
+    known = lost[2:22][np.isfinite(lost[2:22])]
+    assert events[0].evidence["mu_lost"] == np.count_nonzero(known) / known.size
