@@ -11,9 +11,9 @@ import aqualog
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 93_330  # of the package: 77,720 before the verdict, the checks of inputs and `init`; 60,000 is the goal
-MOST_FILES = 509
-MOST_TEST_LINES = 66_820
+MOST_LINES = 94_400  # of the package: 77,720 before the verdict, the checks of inputs and `init`; 60,000 is the goal
+MOST_FILES = 514
+MOST_TEST_LINES = 67_400
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100

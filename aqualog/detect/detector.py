@@ -62,8 +62,8 @@ class Settings:
     joint_cusum: JointCusumParams = field(default_factory=JointCusumParams)
 
 
-Kind = Literal["effect", "joint", "rival"]
-"""A single effect of the thesis, a joint detector that reads the single ones, or a method of the prior art."""
+Kind = Literal["effect", "joint", "warning", "rival"]
+"""A single effect of the thesis, a joint detector that reads the single ones, a warning before it, or prior art."""
 
 
 class Needs(NamedTuple):

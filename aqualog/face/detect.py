@@ -161,7 +161,7 @@ class Detection(Result):
         return drive_report(self.drive_result)
 
     def headline(self) -> str:
-        from aqualog.report.drive.judged import headline, lines_of
+        from aqualog.report.drive.judged import headline, lines_of, margin_lines
         from aqualog.report.drive.report import lacking
 
         found, signals = self.drive_result, self.drive_result.signals
@@ -169,7 +169,7 @@ class Detection(Result):
         return "\n".join([
             f"{self.drive.title}, {found.vehicle_name}: {signals.duration_s:.1f} s at {rate:g} Hz",
             headline(found.judgement),
-            *(f"  {line}" for line in lines_of(found.judgement, 4)),
+            *(f"  {line}" for line in (*lines_of(found.judgement, 4), *margin_lines(found.margin))),
             *([f"  Not judged: {'; '.join(lacks)}"] if lacks else []),
         ])  # fmt: skip
 

@@ -25,7 +25,10 @@ CAR_AWD = Vehicle(
 )  # fmt: skip
 GRAVITY = 9.81
 RHO = 1000.0
-TREADS = {"very_worn_summer": (0.25e-3, 1.03), "worn_summer": (0.40e-3, 1.0), "new_summer": (1.95e-3, 0.90)}
+# room of the grooves [m], slope factor, their depth [mm]
+TREADS = {
+    "very_worn_summer": (0.25e-3, 1.03, 1.0), "worn_summer": (0.40e-3, 1.0, 1.6), "new_summer": (1.95e-3, 0.90, 7.8),
+}  # fmt: skip
 PLAN = (
     ("worn_summer", 1.9, 1.3, 0.0), ("worn_summer", 1.9, 2.0, 0.0), ("worn_summer", 1.9, 0.8, 0.0),
     ("worn_summer", 2.8, 1.3, 0.0), ("very_worn_summer", 1.9, 1.3, 0.0), ("worn_summer", 1.9, 1.3, 270.0),
@@ -103,36 +106,34 @@ def _pass(rng, hidden, car, values, v_mid, a, lane):
     loads = {"f": 0.5 * (mass * GRAVITY - rear_weight - transfer), "r": 0.5 * (rear_weight + transfer)}
     still = {"f": 0.5 * car.mass * GRAVITY * car.l_r / car.wheelbase}
     still["r"] = 0.5 * car.mass * GRAVITY - still["f"]
-    capacity, factor = TREADS[values["tyre"]]
+    capacity, factor, tread = TREADS[values["tyre"]]
     bar = values["pressure_rear_bar"]
     slope0 = 31.0 * factor * _softness(bar) / _softness(1.9)
     contact, slowing, water = {}, {}, np.zeros(t.size)
     for side, s in (("left", "l"), ("right", "r")):
         told = values["water_depth_left_mm" if side == "left" else "water_depth_mm"] * 1e-3
         depth = told * hidden.depth.get(side, 1.0) * np.maximum(1.0 + 0.05 * _ou(rng, v, dt, 5.0), 0.0)
-        road = _ou(rng, v, dt, 2.5)
+        road = _ou(rng, v, dt, 0.4)
         film = depth
         for axle in "fr":
-            scatter = 0.06 * (road + _ou(rng, v, dt, 2.5)) / math.sqrt(2.0)
-            float_at = _floating(film, loads[axle], bar, capacity) * (1.0 + scatter)
-            lost = np.minimum((v / np.maximum(float_at, 1.0)) ** 4 * hidden.contact.get(axle, 1.0), 1.0)
-            lost = np.where(film > capacity, lost, 0.0)
+            scatter = 0.06 * (road + _ou(rng, v, dt, 0.4)) / math.sqrt(2.0)
+            float_at = _floating(film, loads[axle], bar, capacity, tread) * (1.0 + scatter)
+            lost = np.minimum((v / np.maximum(float_at, 1.0)) ** 3.5 * hidden.contact.get(axle, 1.0), 1.0)
             L = 1.0 - lost
             gain = hidden.drag.get(axle, 1.0)
-            grooves = np.minimum(capacity / np.maximum(film, 1e-9), 1.0)
-            thrown = gain * RHO * 0.205 * _saturated(film, 0.6e-3) * (1.0 - 0.7 * grooves) * v * v
+            grooves = 1.0 - _outside(film, capacity)
+            thrown = gain * RHO * 0.205 * _saturated(film, 0.5e-3) * (1.0 - 0.7 * grooves) * v * v
             half = 0.07 * math.sqrt(loads[axle] / 4000.0 * 2.2 / bar)
-            lever = half * (
-                (2.0 * L - 1.0 + 0.93 * 2.0 * (1.0 - L)) * (1.0 - L * L * (3.0 - 2.0 * L)) - 3.0 * L * L * lost**2
-            )
+            lever = 0.45 * half * lost
             ahead = gain * RHO * 0.205 * np.maximum(film - 1.3e-3, 0.0) * v * v
             contact[axle + s], slowing[axle + s] = (
                 np.where(wet, L, 1.0),
-                np.where(wet, thrown + lever * loads[axle] / 0.309, 0.0),
+                np.where(wet, thrown + lever * loads[axle] / 0.317, 0.0),
             )
-            water += np.where(wet, thrown + lever * loads[axle] / 0.309 + ahead, 0.0)
+            water += np.where(wet, thrown + lever * loads[axle] / 0.317 + ahead, 0.0)
             left = 0.5e-3 + hidden.track
-            film = np.minimum(depth, left) + np.maximum(depth - left, 0.0) * lost**6
+            behind = -left * np.expm1(-depth / left)
+            film = (behind + (depth - behind) * lost**6) * np.maximum(1.0 + 0.3 * _ou(rng, v, dt, 1.0), 0.0)
     water += mass * np.where(wet, hidden.hump * np.exp(-(((v * 3.6 - 78.0) / 6.0) ** 2)), 0.0)
     air = 0.5 * car.drag_area * 1.204 * v * v
     pull = mass * a + air + car.rolling_resistance * mass * GRAVITY + water
@@ -169,11 +170,22 @@ def _softness(bar):
     return 1.0 - 0.3485 * d + 0.378 * d * d
 
 
-def _floating(film, load, bar, capacity):
-    """Speed of floating: 125 km/h at 1.3 mm, 1.9 bar, 4 kN; a wedge that completes over 0.15 mm."""
-    free = np.clip((film - capacity) / 0.15e-3, 1e-9, 1.0)
-    deep = np.sqrt(np.sqrt((1.0 + (1.3 / 2.0) ** 2) / (1.0 + (film / 2.0e-3) ** 2)))
-    return 125.0 / 3.6 * math.sqrt(bar / 1.9) * (load / 4000.0) ** 0.2 * deep * free**-0.25
+def _outside(film, room):
+    """Share of the film that finds no room in the grooves."""
+    return 1.0 - room / np.cbrt(room**3 + film**3)
+
+
+def _floating(film, load, bar, room, tread):
+    """Speed of floating: 120.5 km/h at 1.3 mm, 1.9 bar, 4 kN, 1.6 mm of tread; bulk water from 2 mm on."""
+
+    def over_depth(h, groove):
+        bulk = 0.49 + 0.82 * np.exp(-0.06 * np.log(1e3 * h))
+        wedge = -np.expm1(-h * _outside(h, groove) / 0.15e-3)
+        return bulk * (1.58 + (500.0 * h) ** 4) / (1.0 + (500.0 * h) ** 4) / wedge ** (2.0 / 7.0)
+
+    channels = (1.0 + 0.0335 * tread) / (1.0 + 0.0335 * 1.6)
+    depth = over_depth(np.maximum(film, 1e-5), room) / over_depth(1.3e-3, 0.4e-3)
+    return 120.5 / 3.6 * (bar / 1.9) ** 0.3 * (load / 4000.0) ** 0.2 * channels * depth
 
 
 def _saturated(h, top):
