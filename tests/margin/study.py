@@ -186,7 +186,7 @@ def real() -> None:
 
     for name, files, dbc in (
         ("toyota", ("toyota_rav4/can_bus.mf4",), ("toyota_rav4/toyota_2017.dbc",)),
-        *(("bmw", (f"bmw_i3/{p.name}",), ()) for p in sorted((REAL / "bmw_i3").glob("*.csv"))),
+        *(("bmw_i3", (f"bmw_i3/{p.name}",), ()) for p in sorted((REAL / "bmw_i3").glob("*.csv"))),
     ):
         car = HERE / f"{name}.toml"
         if not car.exists():
