@@ -316,6 +316,20 @@ class Remark:
 
 
 @dataclass(frozen=True, slots=True)
+class Margin:
+    """The least distance to full aquaplaning of a drive.
+
+    `least` with its 90 % interval `ci90` [m/s], negative beyond full aquaplaning; `at_s` when, `warned_s` when the
+    first warning began, NaN without one. [s]
+    """
+
+    least: float
+    ci90: tuple[float, float]
+    at_s: float
+    warned_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class DriveResult:
     """All results of `detect` for one drive.
 
@@ -323,7 +337,7 @@ class DriveResult:
     column is present only if its signals are.
     `limited` are detectors that ran without one of their conditions, with the signals that are missing for it.
     `checks`: what does not fit among the signals; the notes hold their sentences.
-    `judgement` has the verdict and the episodes.
+    `judgement` has the verdict and the episodes, `margin` the least distance to full aquaplaning.
     """
 
     signals: Signals
@@ -337,3 +351,4 @@ class DriveResult:
     slopes: tuple[SlopeSummary, ...] = ()
     checks: tuple[Remark, ...] = ()
     judgement: Judgement = field(default_factory=Judgement)
+    margin: Margin | None = None

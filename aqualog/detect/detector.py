@@ -53,17 +53,18 @@ class Settings:
 
     `thresholds` by the name of the detector, in the unit of its statistic; those left out keep their default.
     `correct_yaw` as in `FeatureStream`. `learns_offset`: the offset of the resistance measure on dry road is estimated
-    and subtracted. `joint_cusum`: scales of joint detector 2.
+    and subtracted. `warns`: the distance to full aquaplaning besides. `joint_cusum`: scales of joint detector 2.
     """
 
     thresholds: Mapping[str, float] = field(default_factory=dict)
     correct_yaw: bool = True
     learns_offset: bool = True
+    warns: bool = False
     joint_cusum: JointCusumParams = field(default_factory=JointCusumParams)
 
 
-Kind = Literal["effect", "joint", "rival"]
-"""A single effect of the thesis, a joint detector that reads the single ones, or a method of the prior art."""
+Kind = Literal["effect", "joint", "warning", "rival"]
+"""A single effect of the thesis, a joint detector that reads the single ones, a warning before it, or prior art."""
 
 
 class Needs(NamedTuple):

@@ -25,6 +25,7 @@ BRAKING_GAP_S = 3.0  # [s] lock-ups nearer than this belong to one braking
 STEP_S = 0.1  # [s] of the way that is kept
 
 _JOINT = tuple(d.name for d in all_of("joint"))
+_WARNINGS = tuple(d.name for d in all_of("warning"))  # they come before, and are no aquaplaning
 _WHEELS = (SPIN_DOWN.name, MINOR_SPIN_DOWN.name, SPIN_UP.name)
 _FORCES = (*_JOINT, RESISTANCE.name)  # what the water does to the car as a whole
 _EFFECT = {MINOR_SPIN_DOWN.name: SPIN_DOWN.name}  # both see the same wheel slow down
@@ -82,7 +83,7 @@ def episodes_of(events: Sequence[Event], way: Stretch) -> tuple[Episode, ...]:
     Returns
     -------
     tuple of Episode
-        In order of their beginning; each event is in exactly one of them.
+        In order of their beginning; each event but a warning is in exactly one of them.
 
     What the water does to the car makes an episode: joint warnings and resistance whose causes are less than 1 s apart.
     Its wheels belong to it as long as they follow without a second's pause. One that was stopped or spun needs seconds
@@ -91,7 +92,7 @@ def episodes_of(events: Sequence[Event], way: Stretch) -> tuple[Episode, ...]:
     one episode where less than 1 s lies between them. What began under a braking force is apart: lock-ups less than 3 s
     from each other are one braking, and a lock-up within an episode of aquaplaning belongs to it.
     """
-    numbered = list(enumerate(events))
+    numbered = [x for x in enumerate(events) if x[1].detector not in _WARNINGS]
     free = [x for x in numbered if not _is_braking(x[1])]
     water = [_Water(group) for group in _groups([x for x in free if x[1].detector in _FORCES], GAP_S)]
     others = _by_begin(x for x in free if x[1].detector not in _FORCES)

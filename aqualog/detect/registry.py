@@ -9,6 +9,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.detect.detector import Detector, Kind
 from aqualog.detect.joint_criteria import JOINT_CRITERIA
 from aqualog.detect.joint_cusum import JOINT_CUSUM
+from aqualog.detect.margin.watch import MARGIN
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import RESISTANCE
 from aqualog.detect.rivals.front_rear_pattern import FRONT_REAR_PATTERN
@@ -21,10 +22,10 @@ from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 from aqualog.detect.spin import SPIN_DOWN, SPIN_UP
 from aqualog.detect.tie_rod import TIE_ROD
 
-__all__ = ["BY_NAME", "DETECTORS", "RIVALS", "all_of", "check_needs", "running_order"]
+__all__ = ["BY_NAME", "DETECTORS", "OWN", "RIVALS", "all_of", "check_needs", "running_order"]
 
 _ALL = (
-    SPIN_DOWN, MINOR_SPIN_DOWN, SPIN_UP, RESISTANCE, SLIP_SLOPE_DROP, TIE_ROD, JOINT_CRITERIA, JOINT_CUSUM,
+    SPIN_DOWN, MINOR_SPIN_DOWN, SPIN_UP, RESISTANCE, SLIP_SLOPE_DROP, TIE_ROD, JOINT_CRITERIA, JOINT_CUSUM, MARGIN,
     # prior art that the thesis cites in chapter 1, in its order: wheels, resistance, slope
     WHEEL_THRESHOLDS, FRONT_REAR_PATTERN, WHEEL_OSCILLATION, RESISTANCE_MODEL, SLOPE_RLS, SLOPE_KALMAN,
     SLOPE_FRICTION_EKF,
@@ -38,8 +39,11 @@ def all_of(*kinds: Kind) -> tuple[Detector, ...]:
     return tuple(d for d in BY_NAME.values() if d.kind in kinds)
 
 
-DETECTORS = tuple(d.name for d in all_of("effect", "joint"))
-"""Names of the thesis' own."""
+OWN: tuple[Kind, ...] = ("effect", "joint")
+"""Kinds that run on every drive: the thesis' own."""
+
+DETECTORS = tuple(d.name for d in all_of(*OWN))
+"""Names of these."""
 
 RIVALS = {d.name: d for d in all_of("rival")}
 """Methods of the prior art."""
@@ -85,7 +89,7 @@ def check_needs(
         Each with the signals (or `vehicle.KEY`) that are missing.
     """
     have = frozenset(available)
-    chosen = all_of("effect", "joint") if detectors is None else detectors
+    chosen = all_of(*OWN) if detectors is None else detectors
     needs = {d.name: d.needs(vehicle, have, rate_hz) for d in chosen}
     unavailable = [Unavailable(name, tuple(dict.fromkeys(n.missing))) for name, n in needs.items() if n.missing]
     limited = [Unavailable(name, n.lacks) for name, n in needs.items() if n.lacks and not n.missing]

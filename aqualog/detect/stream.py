@@ -16,7 +16,8 @@ from aqualog.detect.braking import BrakeWatch
 from aqualog.detect.detector import Detector, Scene, Settings, Setup
 from aqualog.detect.episodes import Way
 from aqualog.detect.events import EventBook
-from aqualog.detect.registry import RIVALS, all_of, check_needs, running_order
+from aqualog.detect.margin.watch import MARGIN, Least
+from aqualog.detect.registry import OWN, RIVALS, all_of, check_needs, running_order
 from aqualog.detect.slip_slope.history import Memory
 from aqualog.detect.slip_slope.watch import DropWatch, remarks
 from aqualog.detect.verdict import JOINT, judge
@@ -69,7 +70,8 @@ class DriveStream:
         self.memory = memory or Memory()
         self._features = FeatureStream(vehicle, dt, available, correct_yaw=settings.correct_yaw)
         self._available = self._features.available
-        chosen = tuple(all_of("effect", "joint") if detectors is None else detectors)
+        usual = all_of(*OWN, "warning") if settings.warns else all_of(*OWN)
+        chosen = tuple(usual if detectors is None else detectors)
         unavailable, limited = check_needs(vehicle, available, rate_hz=1e9 / dt_ns, detectors=chosen)
         self.unavailable: tuple[Unavailable, ...] = tuple(unavailable)
         self.limited: tuple[Unavailable, ...] = tuple(limited)
@@ -128,6 +130,7 @@ class Through:
         self._vehicle = vehicle
         self._events: list[Event] = []
         self._way = Way(self._stream.dt)
+        self._least = Least(self._stream.dt)
         self._judged = 0
 
     def push(self, columns: Mapping[str, FloatArray]) -> Piece:
@@ -136,6 +139,8 @@ class Through:
         self._checks.push(columns, piece.features)
         self._events += piece.events
         self._way.push(piece.features["v_x_hat"])
+        warned = next((t.active for t in piece.tracks if t.detector == MARGIN.name), None)
+        self._least.push(piece.features, warned)
         joint = (t for t in piece.tracks if t.detector in JOINT)
         self._judged += max((int(np.count_nonzero(~np.isnan(t.statistic))) for t in joint), default=0)
         return piece
@@ -164,6 +169,7 @@ class Through:
             slopes=slopes,
             checks=checks,
             judgement=judgement,
+            margin=self._least.result(),
         )
 
 

@@ -161,7 +161,7 @@ class Detection(Result):
         return drive_report(self.drive_result)
 
     def headline(self) -> str:
-        from aqualog.report.drive.judged import headline, lines_of
+        from aqualog.report.drive.judged import headline, lines_of, margin_lines
         from aqualog.report.drive.report import lacking
 
         found, signals = self.drive_result, self.drive_result.signals
@@ -169,7 +169,7 @@ class Detection(Result):
         return "\n".join([
             f"{self.drive.title}, {found.vehicle_name}: {signals.duration_s:.1f} s at {rate:g} Hz",
             headline(found.judgement),
-            *(f"  {line}" for line in lines_of(found.judgement, 4)),
+            *(f"  {line}" for line in (*lines_of(found.judgement, 4), *margin_lines(found.margin))),
             *([f"  Not judged: {'; '.join(lacks)}"] if lacks else []),
         ])  # fmt: skip
 
@@ -242,6 +242,7 @@ def detect(
     history: PathLike | None = None,
     configuration: str = "",
     reference: str = "robust",
+    margin: bool = False,
     windows: PathLike | None = None,
     whole: bool = False,
     samples: bool = True,
@@ -266,6 +267,8 @@ def detect(
         What the dry slope belongs to: tyre, pressure, load, in any words; default the vehicle's name.
     reference : str
         Dry slope of the history: `robust` (upper quartile of the periods' means) or `max` (as the thesis).
+    margin : bool
+        Whether to estimate the distance to full aquaplaning too. It is on trial: rough asphalt makes it warn.
     windows : str or Path, optional
         Folder for `signals.parquet` of a drive that is too long for memory: its samples are written while it is read.
     whole : bool
@@ -294,6 +297,10 @@ def detect(
         from aqualog.config.thresholds import load_settings
 
         settings = load_settings(file_of(thresholds, "thresholds"))
+    if margin:
+        from aqualog.detect.detector import Settings
+
+        settings = replace(settings or Settings(), warns=True)
     known = model_of(model)
     asked = (("writing a log", whole), ("a model", known is not None), ("a history", history is not None))
     needs = ", ".join(n for n, is_asked in asked if is_asked)

@@ -58,6 +58,14 @@ FEATURES = (
     Feature("criterion", "number", "0 or 1", "whether the criterion of section 2.5 is met", "joint_criteria"),
     Feature("criterion_full", "", "0 or 1", "whether a wheel has lost the road", "joint_criteria"),
     Feature("joint_gate", "", "0 or 1", "whether the resistance gate is open", "joint_criteria"),
+    Feature("aquaplaning_margin", "", "m/s", "distance to full aquaplaning, median; empty without water", "margin"),
+    Feature("aquaplaning_margin_low", "", "m/s", "lower end of its 90 % interval", "margin"),
+    Feature("aquaplaning_margin_high", "", "m/s", "upper end of its 90 % interval", "margin"),
+    Feature("aquaplaning_margin_q25", "", "m/s", "lower end of its 50 % interval", "margin"),
+    Feature("aquaplaning_margin_q75", "", "m/s", "upper end of its 50 % interval", "margin"),
+    Feature("full_speed_expected", "", "m/s", "speed of full aquaplaning, median; empty without water", "margin"),
+    Feature("contact_expected", "", "-", "contact share of the front axle, mean; empty without water", "margin"),
+    Feature("water_probability", "", "-", "probability of water under the wheels", "margin"),
     Feature("joint_term", "detector", "-", "weighted term of the sum (2.11), 0 to its weight", "joint_cusum"),
 )  # fmt: skip
 """In the order in which they are made."""

@@ -26,6 +26,8 @@ _EVIDENCE = {
     "slope_ref": ("dry slip slope", 1.0, "", 1),
     "mu": ("traction coefficient", 1.0, "", 3),
     "delta_a_x": ("resistance measure", 1.0, "m/s²", 2),
+    "margin": ("distance to full aquaplaning", KMH, "km/h", 0),
+    "contact": ("contact share", 100.0, "%", 0),
     "force_residual": ("off the tie-rod model", 1.0, "N", 0),
     "torque_residual": ("off the steering model", 1.0, "N·m", 1),
 }
@@ -36,9 +38,9 @@ _CRITERIA = {1: "spin-down", 2: "minor spin-down", 3: "spin-up", 4: "slip slope"
 @cache
 def _detectors() -> Mapping[str, Detector]:
     # the registry compiles the detectors, which takes longer than any page that names none
-    from aqualog.detect.registry import all_of
+    from aqualog.detect.registry import OWN, all_of
 
-    return {d.name: d for d in all_of("effect", "joint")}
+    return {d.name: d for d in all_of(*OWN, "warning")}
 
 
 def detector_name(detector: str) -> str:

@@ -23,6 +23,7 @@ from aqualog.align.load import load_signals
 from aqualog.config.scenario import load_scenario
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.notation import WHEELS
+from aqualog.detect.detector import Settings
 from aqualog.detect.stream import detect_drive
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
@@ -43,7 +44,11 @@ def sample():
     """The sample drive with its features and tracks, and its vehicle."""
     car = load_vehicle(SAMPLES / "vehicle.toml")
     signals = load_signals([SAMPLES / "lane_drive.mf4"], vehicle=car)
-    return signals.array("on_water"), detect_drive(signals, car), np.arange(signals.frame.height) * signals.dt
+    return (
+        signals.array("on_water"),
+        detect_drive(signals, car, settings=Settings(warns=True)),
+        np.arange(signals.frame.height) * signals.dt,
+    )
 
 
 def panels(titles, *, height=210, log=()):
@@ -199,6 +204,17 @@ def joint_cusum():
     return fig.update_xaxes(range=(6.0, 20.0))
 
 
+def margin():
+    _, result, t = sample()
+    f = result.features
+    fig = panels(["distance [km/h]", "warning [-]"], height=420)
+    for name, colour in (("_low", MUTED), ("_q25", WATER), ("", INK), ("_q75", WATER), ("_high", MUTED)):
+        line(fig, 1, t, 3.6 * f[f"aquaplaning_margin{name}"].to_numpy(), name.strip("_") or "median", colour, width=1.2)
+    line(fig, 2, t, track(result, "margin").statistic, "below 30 km/h", INK, width=1.2)
+    level(fig, 2, 0.5, "threshold 0.5")
+    return fig.update_xaxes(range=(6.0, 20.0))
+
+
 def reading():
     """The sample drive with faults put in, and what reading makes of it."""
     import polars as pl
@@ -349,7 +365,7 @@ def _label(row):
 OWN: dict[str, Callable[[], go.Figure]] = {
     f.__name__: f
     for f in (
-        spin_down, minor_spin_down, resistance, slip_slope_drop, joint_criteria, joint_cusum, reading, alignment,
+        spin_down, minor_spin_down, resistance, slip_slope_drop, joint_criteria, joint_cusum, margin, reading, alignment,
         water_law, calibration, diagnosis, evaluation,
     )
 }  # fmt: skip

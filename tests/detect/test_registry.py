@@ -15,7 +15,7 @@ from aqualog.features.names import FEATURES, feature_of
 from tests.conftest import ROOT
 from tests.drives import AWD, CAR, drive, lane
 
-OWN = all_of("effect", "joint")
+OWN = all_of("effect", "joint", "warning")
 DT_NS = 10_000_000
 
 

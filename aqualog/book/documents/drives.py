@@ -81,6 +81,12 @@ DETECT = Document(
         text("vehicle", "name of the car"),
         by_name("signals", "every signal that the drive has", _SIGNAL),
         *JUDGEMENT,
+        obj("margin", "least distance to full aquaplaning; null where no water was probable", (
+            number("least_kmh", "km/h", "median; negative beyond full aquaplaning"),
+            interval("ci90", "km/h", "90 % interval"),
+            number("at_s", "s", "when"),
+            number("warned_s", "s", "when the detector `margin` first warned; null without a warning", null=True),
+        ), null=True),
         rows("events", "every event, by begin", (*EVENT, obj("evidence", "what was measured in the event; the fields "
              "depend on the detector", EVIDENCE))),
         rows("unavailable", "detectors that cannot run", LACKING),

@@ -234,6 +234,8 @@ _EVIDENCE = (
         number("mu_min", "-", "least traction coefficient"),
         number("mu_lost", "-", "share of the event with a traction coefficient below 0.02"),
         number("delta_a_x_max", "m/s^2", "greatest resistance measure while not braking (2.9)"),
+        number("margin_min", "m/s", "least distance to full aquaplaning"),
+        number("contact_min", "-", "least contact share of the front axle that is expected"),
         number("force_residual_min", "N", "least residual of the tie-rod force"),
         number("force_residual_max", "N", "greatest residual of the tie-rod force"),
         number("torque_residual_min", "N*m", "least residual of the steering torque"),

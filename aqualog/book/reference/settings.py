@@ -11,7 +11,7 @@ from aqualog.config.reader import Key
 from aqualog.config.scenario import SCENARIO_KEYS
 from aqualog.config.signal_map import MAP_KEYS
 from aqualog.config.thresholds import JOINT_KEYS
-from aqualog.detect.registry import RIVALS, all_of
+from aqualog.detect.registry import OWN, RIVALS, all_of
 from aqualog.detect.slip_slope.tuning import MEANINGS as TUNING_MEANINGS
 from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.model.tyre import TYRE_KEYS, TYRES
@@ -263,7 +263,7 @@ _TESTS = (
 
 def thresholds_page() -> str:
     """The page."""
-    own = [(code(d.name), d.unit, f"{d.threshold:g}", d.meaning) for d in all_of("effect", "joint")]
+    own = [(code(d.name), d.unit, f"{d.threshold:g}", d.meaning) for d in all_of(*OWN, "warning")]
     rivals = [(code(r.name), r.unit, f"{r.threshold:g}", f"{r.title} {r.reference}") for r in RIVALS.values()]
     joint = [(code(k.name), k.kind, str(k.default), k.meaning) for k in JOINT_KEYS]
     tuning = [(code(n), unit, _shown(getattr(TUNING, n)), meaning) for n, (unit, meaning) in TUNING_MEANINGS.items()]

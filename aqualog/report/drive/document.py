@@ -12,12 +12,12 @@ import polars as pl
 
 from aqualog import __version__
 from aqualog.core.notation import SYMBOLS
-from aqualog.core.records import DriveResult, Event, Remark, Signals, Track
+from aqualog.core.records import DriveResult, Event, Margin, Remark, Signals, Track
 from aqualog.features.names import feature_of
 from aqualog.io.log_event import LogEvent
 from aqualog.io.write_log import LogGroup
 from aqualog.report.drive.judged import KIND_NAMES, episode_sentence
-from aqualog.report.values import fields_of, plain
+from aqualog.report.values import KMH, fields_of, plain
 from aqualog.report.wording import detector_name, evidence_parts
 
 __all__ = [
@@ -50,6 +50,7 @@ def document(result: DriveResult, *, log: str) -> dict[str, Any]:
         "vehicle": result.vehicle_name,
         "signals": {name: _signal(signals, name) for name in signals.symbols},
         **result.judgement.document(),
+        "margin": _margin(result.margin),
         "events": [fields_of(e, *_EVENT) for e in result.events],
         "unavailable": [fields_of(u, "detector", "missing") for u in result.unavailable],
         "limited": [fields_of(u, "detector", "missing") for u in result.limited],
@@ -63,6 +64,15 @@ def document(result: DriveResult, *, log: str) -> dict[str, Any]:
         },
         "checks": remark_rows(result.checks),
     }
+
+
+def _margin(margin: Margin | None) -> dict[str, Any] | None:
+    if margin is None:
+        return None
+    return {
+        "least_kmh": plain(KMH * margin.least), "ci90": [plain(KMH * x) for x in margin.ci90],
+        "at_s": plain(margin.at_s), "warned_s": plain(margin.warned_s),
+    }  # fmt: skip
 
 
 def remark_rows(remarks: Sequence[Remark]) -> list[dict[str, Any]]:

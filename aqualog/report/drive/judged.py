@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from aqualog.core.judgement import Episode, EpisodeKind, Judgement
+from aqualog.core.records import Margin
 from aqualog.report.sections import Cell, Line
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.values import KMH, counted, number
@@ -13,7 +14,7 @@ from aqualog.report.wording import detector_name
 
 __all__ = [
     "EPISODE_HEADS", "FOLDED", "KIND_NAMES", "card_lines", "episode_cells", "episode_sentence", "folded_line",
-    "headline", "judged_by", "level", "lines_of", "missing_words",
+    "headline", "judged_by", "level", "lines_of", "margin_lines", "missing_words",
 ]  # fmt: skip
 
 KIND_NAMES: dict[EpisodeKind, str] = {
@@ -90,6 +91,15 @@ def folded_line(kind: EpisodeKind, episodes: Sequence[Episode]) -> str:
     if len(episodes) == 1:
         return f"{name}: {episode_sentence(episodes[0])}"
     return f"{name}: {len(episodes)} episodes, {counted(sum(len(e.events) for e in episodes), 'detection')}"
+
+
+def margin_lines(margin: Margin | None) -> list[str]:
+    """`Least distance to full aquaplaning: 14 km/h (8 … 21) at 9.1 s, first warning at 8.4 s`; none without water."""
+    if margin is None:
+        return []
+    least, low, high = (number(KMH * x, 0) for x in (margin.least, *margin.ci90))
+    warned = f", first warning at {margin.warned_s:.1f} s" if math.isfinite(margin.warned_s) else ", no warning"
+    return [f"Least distance to full aquaplaning: {least} km/h ({low} … {high}) at {margin.at_s:.1f} s{warned}"]
 
 
 def card_lines(judgement: Judgement, duration_s: float, most: int = 4) -> list[Line]:

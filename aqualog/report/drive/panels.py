@@ -49,6 +49,7 @@ def _feature(frame: pl.DataFrame, name: str) -> FloatArray | None:
 def _rows(r: DriveResult) -> Iterator[Row]:
     yield _speeds(r)
     yield _lanes(r)
+    yield _margin(r)
     yield Row(
         "Speed difference", "wheel minus vehicle; below zero the wheel spins down", "km/h",
         _wheel_lines(r, "v_w_delta", ("m/s", "km/h")), include=(-1.0, 1.0), height=150,  # Eq. (2.4)
@@ -154,6 +155,21 @@ def _statistic(detector: str, tracks: Sequence[Track]) -> Row:
     thresholds = tuple(sorted({t.threshold for t in tracks if np.isfinite(t.threshold)}))
     unit = pretty_unit(tracks[0].unit)
     return Row(detector_name(detector), caption(detector), unit, lines, thresholds=thresholds, include=(0.0,))
+
+
+def _margin(r: DriveResult) -> Row:
+    """How many km/h are left to full aquaplaning, as a band."""
+    ends = (
+        ("95 %", "high", MUTED, 0.9), ("75 %", "q75", WATER, 1.0), ("median", "", INK, 1.8),
+        ("25 %", "q25", WATER, 1.0), ("5 %", "low", MUTED, 0.9),
+    )  # fmt: skip
+    columns = [(*e, _feature(r.features, f"aquaplaning_margin_{e[1]}" if e[1] else "aquaplaning_margin")) for e in ends]
+    lines = tuple(
+        Line(label, VEHICLE, colour, v, width, ("m/s", "km/h")) for label, _, colour, width, v in columns
+        if v is not None
+    )  # fmt: skip
+    about = "how much faster the car could go; below zero it floats; empty where no water is probable"
+    return Row("Distance to full aquaplaning", about, "km/h", lines, include=(0.0, 30.0), height=150, decimals=0)
 
 
 def _slip_slope(r: DriveResult) -> Row:

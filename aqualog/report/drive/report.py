@@ -23,6 +23,7 @@ from aqualog.report.drive.judged import (
     headline,
     judged_by,
     level,
+    margin_lines,
 )
 from aqualog.report.drive.panels import drive_rows
 from aqualog.report.drive.route import route_figure
@@ -90,6 +91,7 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
     lacks = lacking(result)
     signals = result.signals
     answers: list[Line] = [
+        *margin_lines(result.margin),
         *card_lines(judgement, signals.duration_s),
         *([("Not judged:", "; ".join(lacks))] if lacks else []),
     ]

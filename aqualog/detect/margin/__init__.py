@@ -1,0 +1,1 @@
+"""How far a drive is from full aquaplaning."""

@@ -1,0 +1,92 @@
+"""What the filter reads of a drive, and where none of it counts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.core.compiled import compiled
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
+from aqualog.detect.detector import Scene
+from aqualog.detect.margin.state import Inputs
+from aqualog.features.smoothing import UNSET, lowpass
+from aqualog.physics.load import G
+
+__all__ = ["Reader"]
+
+V_MIN = 11.0  # [m/s] slower, water does nothing that counts
+A_Y_MAX = 2.5  # [m/s^2] beyond, cornering costs more than the balance knows
+A_MOST, A_LEAST = 0.5, -1.5  # [m/s^2] beyond, an unknown trailer shows more than water; braking
+U_MAX = 0.25  # [-] of the traction: beyond, the slip of a dry tyre is no longer a line
+JUMP = 0.03  # [-] of the traction within a tenth of a second: a gear shift, which torque signals report late
+HOLD = 0.3  # [s] after it
+TAU_JUMP = 0.1  # [s]
+
+
+@compiled
+def _gate(samples, left, jump):  # type: ignore[no-untyped-def]
+    out = np.empty(jump.size, dtype=np.bool_)
+    for i in range(jump.size):
+        left = samples if jump[i] else max(left - 1, 0)
+        out[i] = left > 0
+    return out, left
+
+
+class Reader:
+    """Turns scenes into the inputs of the filter, piece by piece.
+
+    Parameters
+    ----------
+    dt : float
+        Sample time. [s]
+    """
+
+    def __init__(self, vehicle: Vehicle, dt: float) -> None:
+        self._vehicle = vehicle
+        self._dt = dt
+        self._slow = {"f": UNSET, "r": UNSET}
+        self._left = 0
+        front = vehicle.mass * G * vehicle.l_r / vehicle.wheelbase
+        self._load = {"f": 0.5 * front, "r": 0.5 * (vehicle.mass * G - front)}  # of a wheel
+
+    def push(self, scene: Scene) -> Inputs:
+        """Return the inputs of the next piece, (n,)."""
+        f = scene.f
+        v, a = f["v_x_hat"], f["a_kin_slow"]
+        none = np.full(scene.size, np.nan)
+        u = self._traction(scene)
+        jump = self._jumps(u[0] + u[1], u[2] + u[3])
+        with np.errstate(invalid="ignore"):
+            rolls = (v > V_MIN) & ~scene.is_braking & ~jump
+            trusted = rolls & (a < A_MOST) & (a > A_LEAST) & ~(np.abs(f["a_y_slow"]) > A_Y_MAX)
+        R = np.where(trusted, f["delta_a_x"], np.nan)
+        sides = []
+        for i, side in enumerate("lr"):
+            front, rear = (f.get(f"v_line_{axle}{side}") for axle in "fr")
+            with np.errstate(invalid="ignore", divide="ignore"):
+                slip = none if front is None or rear is None else (front - rear) / v
+                small = np.maximum(np.abs(u[i]), np.abs(u[2 + i])) < U_MAX
+            sides.append(np.where(trusted & small, slip, np.nan))
+        return Inputs(v, f["a_x_slow"], R, *sides, *u)
+
+    def _jumps(self, front: FloatArray, rear: FloatArray) -> BoolArray:
+        """Where the traction of an axle has just changed faster than torque signals follow."""
+        away = np.zeros(front.size, dtype=bool)
+        for axle, x in (("f", front), ("r", rear)):
+            slow, self._slow[axle] = lowpass(0.5 * x, self._slow[axle], tau=TAU_JUMP, dt=self._dt)
+            with np.errstate(invalid="ignore"):
+                away |= np.abs(0.5 * x - slow) > JUMP
+        bits, left = _gate(max(1, round(HOLD / self._dt)), self._left, away)
+        self._left = int(left)
+        return np.asarray(bits)
+
+    def _traction(self, scene: Scene) -> list[FloatArray]:
+        """Torque over radius and load of each wheel. [-]"""
+        vehicle, a = self._vehicle, scene.f["a_kin_slow"]
+        none = np.zeros(scene.size)
+        return [
+            (scene.columns.get(f"torque_{w}", none) / vehicle.r_e(w) - vehicle.inertia(w) / vehicle.r_e(w) ** 2 * a)
+            / self._load[w[0]]
+            for w in WHEELS
+        ]

@@ -1,0 +1,147 @@
+"""Detector `margin`: it warns before the car floats."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping
+
+import numpy as np
+
+from aqualog.core.compiled import compiled
+from aqualog.core.notation import SIDES
+from aqualog.core.records import BoolArray, FloatArray, Margin
+from aqualog.core.vehicle import Vehicle
+from aqualog.detect.detector import (
+    Detector,
+    Found,
+    Needs,
+    Output,
+    Scene,
+    Setup,
+    missing_balance,
+    missing_wheels,
+    too_slow,
+)
+from aqualog.detect.margin.inputs import Reader
+from aqualog.detect.margin.laws import tables_of
+from aqualog.detect.margin.recursion import scan
+from aqualog.detect.margin.state import OUTPUTS, Filter, FilterParams
+
+__all__ = ["FEATURES", "MARGIN", "Least", "MarginWatch"]
+
+THRESHOLD = 0.5  # [-]
+NEAR = 30.0 / 3.6  # [m/s]
+STEP_S = 0.1  # of the filter
+MIN_RATE = 10.0  # [Hz]
+PROBABLE = 0.5  # [-] of water: below it there is no distance
+FEATURES: Mapping[str, str] = {
+    "aquaplaning_margin": "median", "aquaplaning_margin_low": "low", "aquaplaning_margin_high": "high",
+    "aquaplaning_margin_q25": "q25", "aquaplaning_margin_q75": "q75", "full_speed_expected": "v_full",
+    "contact_expected": "contact",
+}  # fmt: skip
+"""Feature -> row of the filter. They have a value where water is probable; `water_probability` has one everywhere."""
+
+
+@compiled
+def _lasting(least, near, run):  # type: ignore[no-untyped-def]
+    out = np.empty(near.size, dtype=np.bool_)
+    for i in range(near.size):
+        run = run + 1 if near[i] else 0
+        out[i] = run >= least
+    return out, run
+
+
+class MarginWatch:
+    """Distance to full aquaplaning, and a warning while it is probably below 30 km/h, in three steps in a row."""
+
+    def __init__(self, setup: Setup) -> None:
+        vehicle = setup.vehicle
+        block = max(1, round(STEP_S / setup.dt))
+        self._setup = setup
+        self._reader = Reader(vehicle, setup.dt)
+        self._params = FilterParams(
+            block,
+            block * setup.dt,
+            NEAR,
+            vehicle.slip_slope_f,
+            vehicle.slip_slope_r,
+            vehicle.rolling_resistance,
+            vehicle.mu_max,
+        )
+        self._tables = tables_of(vehicle)
+        self._state = Filter.new(self._params, self._tables)
+        self._least = 2 * block + 1
+        self._run = 0
+
+    def push(self, scene: Scene) -> Output:
+        """Take the next piece: one track, the probability that full aquaplaning is less than 30 km/h away. [-]"""
+        v = scene.f["v_x_hat"]
+        values, self._state = scan(self._params, self._tables, self._state, self._reader.push(scene))
+        values = np.where(np.isnan(v), np.nan, values)
+        rows = dict(zip(OUTPUTS, values, strict=True))
+        with np.errstate(invalid="ignore"):
+            wet = rows["p_water"] > PROBABLE
+            near = rows["p_near"] > self._setup.threshold
+        active, self._run = _lasting(self._least, near, self._run)
+        features = {name: np.where(wet, rows[row], np.nan) for name, row in FEATURES.items()}
+        margin = features["aquaplaning_margin"]
+        evidence = {"v_x": ("first", v), "margin_min": ("min", margin), "contact_min": ("min", rows["contact"])}
+        track = self._setup.track(rows["p_near"], active)
+        return Output((Found(track, evidence),), {**features, "water_probability": rows["p_water"]})
+
+
+class Least:
+    """The least distance of a drive, gathered piece by piece.
+
+    Parameters
+    ----------
+    dt : float
+        Sample time. [s]
+    """
+
+    def __init__(self, dt: float) -> None:
+        self._dt = dt
+        self._rows = 0
+        self._best = (math.inf, math.nan, math.nan, math.nan)
+        self._warned = math.nan
+
+    def push(self, features: Mapping[str, FloatArray], active: BoolArray | None) -> None:
+        """Take features and warning bits (n,) of the next samples."""
+        margin = features.get("aquaplaning_margin")
+        if margin is None or active is None:
+            return
+        if np.isfinite(margin).any():
+            i = int(np.nanargmin(margin))
+            if margin[i] < self._best[0]:
+                low, high = features["aquaplaning_margin_low"][i], features["aquaplaning_margin_high"][i]
+                self._best = (float(margin[i]), float(low), float(high), (self._rows + i) * self._dt)
+        if math.isnan(self._warned) and active.any():
+            self._warned = (self._rows + int(np.argmax(active))) * self._dt
+        self._rows += margin.size
+
+    def result(self) -> Margin | None:
+        """Return the least distance; None where no water was probable."""
+        least, low, high, at_s = self._best
+        return Margin(least, (low, high), at_s, self._warned) if math.isfinite(least) else None
+
+
+def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
+    # without the resistance wheels alone would decide, and on a measured dry road they warned
+    has_side = any(not missing_wheels(have, wheels) for wheels in SIDES.values())
+    wheels = missing_wheels(have)
+    balance = missing_balance(vehicle, have)
+    return Needs((*(() if has_side else wheels), *balance, *too_slow(rate_hz, MIN_RATE)), tuple(wheels))
+
+
+MARGIN = Detector(
+    name="margin",
+    title="Margin",
+    unit="-",
+    meaning="probability that full aquaplaning is less than 30 km/h away",
+    statistic="probability that full aquaplaning is less than 30 km/h away",
+    threshold=THRESHOLD,
+    needs=_needs,
+    start=MarginWatch,
+    kind="warning",
+    highest=1.0,
+)

@@ -1,0 +1,162 @@
+"""Passes through water with a known distance to full aquaplaning, of the simulator and of another one of other laws."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aqualog.core.vehicle import Vehicle
+from aqualog.model.drawing import KMH, SCORING_POOL, TUNING_POOL, Drawing
+from aqualog.model.log import as_signals
+from aqualog.model.scenario import Lane
+from aqualog.model.simulate import simulate
+from aqualog.model.situations import believed_vehicle
+from aqualog.model.tyre import TYRES, Tyre
+from aqualog.physics import contact, water
+from aqualog.physics.load import G
+from tests.blind.multibody import tyre as foreign
+from tests.blind.multibody.car import NO_ODD, draw_car, of_the_day, vehicle_file
+from tests.blind.multibody.driver import ROWS, drive_along
+from tests.blind.multibody.roads import Place, build_road
+from tests.blind.multibody.sensors import NOISES, gusts, measure
+
+DISTANCE = (-8.0 * KMH, 55.0 * KMH)  # [m/s] below full aquaplaning at the entry
+V_FULL = (60.0 * KMH, 150.0 * KMH)
+V_LEAST = 50.0 * KMH
+DT = 0.01
+FOREIGN_FROM = 500_000  # seeds of the other simulator, so that no number is used twice
+_SPEEDS = np.arange(30.0, 260.0, 0.25) * KMH
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """One drive over a lane: signals (n,) every `dt` [s], the vehicle file, and the truth.
+
+    `v_full` [m/s]: a front wheel that rolls freely in the deeper track stops from there on. `wet`: time in which the
+    front axle is on the lane [s].
+    """
+
+    columns: Mapping[str, np.ndarray]
+    vehicle: Vehicle
+    v_full: float
+    wet: tuple[float, float]
+    drivetrain: str
+    depth: float
+    note: str
+    dt: float = DT
+
+
+def first_stop(friction: np.ndarray, torque: np.ndarray) -> float:
+    """Least of `_SPEEDS` at which the friction that is left no longer turns the wheel against the water. [m/s]"""
+    stops = friction <= torque
+    return float(_SPEEDS[int(np.argmax(stops))]) if stops.any() else float("inf")
+
+
+def own_full(tyre: Tyre, vehicle: Vehicle, depth: float, p: float) -> float:
+    """Full aquaplaning of a free front wheel in the simulator, by its laws on even water. [m/s]"""
+    F_z = 0.5 * vehicle.mass * G * vehicle.l_r / vehicle.wheelbase
+    end = tyre.full_speed(np.array(depth), np.array(F_z), p=p)
+    L = contact.contact_share(_SPEEDS, end, exponent=tyre.contact_exponent)
+    half = contact.contact_half_length(np.array(F_z), p=p, a_ref=tyre.half_length, F_z_ref=4000.0, p_ref=2.2e5)
+    shift = contact.load_shift(L, half, arm=tyre.wedge_arm) / vehicle.r_e_f
+    film = water.film_drag(
+        np.array(depth), _SPEEDS, _SPEEDS, width=tyre.width, tread_capacity=tyre.tread_capacity, h_film=tyre.h_film,
+        relief=tyre.groove_relief,
+    )  # fmt: skip
+    film = film * water.skimming_share(_SPEEDS, end)
+    friction = vehicle.mu_max * tyre.mu_factor * tyre.wet_friction * contact.friction_ratio(L)
+    return first_stop(friction * F_z, film + (shift + vehicle.rolling_resistance) * F_z)
+
+
+def own_pass(seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE) -> Pass:
+    """A pass of the project's simulator at about one speed: tyre, pressure, water and car are drawn."""
+    rng = np.random.default_rng([seed, 77])
+    pool = (SCORING_POOL, TUNING_POOL)[int(rng.integers(2))]
+    cars = [c for c in pool.vehicles if drivetrain in (None, c.drivetrain)]
+    car = cars[int(rng.integers(len(cars)))]
+    car = replace(car, mass=car.mass * rng.uniform(0.9, 1.1), drag_area=car.drag_area * rng.uniform(0.9, 1.1))
+    away = rng.uniform(*distance)
+    while True:
+        tread = rng.uniform(1.0e-3, 8.0e-3)
+        tyre = replace(TYRES["worn_summer"], tread_depth=tread, slip_slope_factor=1.03 - 0.018e3 * (tread - 1e-3),
+                       width=rng.uniform(0.185, 0.235))  # fmt: skip
+        depth, p = float(np.exp(rng.uniform(np.log(0.6e-3), np.log(6e-3)))), rng.uniform(1.8e5, 2.8e5)
+        full = own_full(tyre, car, depth, p)
+        v = full - away
+        if V_FULL[0] <= full <= V_FULL[1] and V_LEAST <= v <= 160.0 * KMH:
+            break
+    k = Drawing(rng, pool, car, tyre, p, int(rng.integers(2**31)))
+    approach, stay = k.between(9.0, 16.0), 4.0
+    a = k.between(-0.4, 0.4) if k.between(0.0, 1.0) < 0.3 else 0.0
+    start = (v - a * 4.0) * (approach - 4.0) + 4.0 * (v - 2.0 * a)
+    lane = Lane(
+        start, start + stay * v, in_metres=True, depth_left=depth * k.between(0.6, 1.0), depth_right=depth,
+        irregularity_left=k.between(0.05, 0.4), irregularity_right=k.between(0.03, 0.15),
+    )  # fmt: skip
+    speed = ((0.0, v - 4.0 * a), (approach - 4.0, v - 4.0 * a), (approach, v), (approach + stay, v + stay * a))
+    scenario = k.drive(approach + stay + 2.0, speed, lanes=(lane,))
+    believed = believed_vehicle(scenario, rng)
+    signals = as_signals(simulate(scenario), vehicle=believed)
+    film = np.nan_to_num(signals.array("true_film_fr"))
+    on = np.flatnonzero(film > 0.0) * signals.dt_ns * 1e-9
+    columns = {s: signals.array(s) for s in signals.symbols}
+    note = f"{seed} {car.name}, tread {1e3 * tread:.1f} mm, {1e3 * depth:.1f} mm, {1e-5 * p:.1f} bar"
+    return Pass(columns, believed, full, (float(on[0]), float(on[-1])), car.drivetrain, depth, note,
+                signals.dt_ns * 1e-9)  # fmt: skip
+
+
+def foreign_full(car, depth: float) -> float:
+    """Full aquaplaning of a free front wheel of the other simulator. [m/s]"""
+    F_z, gain = float(car.static[0]), float(car.contact_gain[0])
+    lost = np.array([min(foreign.lost_share(v, depth, F_z, 4000.0) * gain, 1.0) for v in _SPEEDS])
+    push = np.array([foreign.water_push(v, depth) for v in _SPEEDS]) * float(car.water_gain[0])
+    pace = _SPEEDS / 30.0
+    rolling = float(car.roll_0[0]) + car.roll_1 * pace + car.roll_4 * pace**4
+    return first_stop(0.78 * float(car.mu[0]) * (1.0 - lost) * F_z, 0.6 * push + rolling * F_z)
+
+
+def foreign_pass(seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE) -> Pass:
+    """A pass of `tests.blind.multibody`: other contact, drag and tyre laws, another driver and other sensors."""
+    rng = np.random.default_rng([seed + FOREIGN_FROM, 78])
+    away = rng.uniform(*distance)
+    while True:
+        car, drive = draw_car(rng)
+        if drivetrain not in (None, drive):
+            continue
+        vehicle = vehicle_file(car, drive, rng)
+        gains = rng.uniform(0.7, 1.5), rng.uniform(0.6, 1.6)
+        own = of_the_day(car, rng)._replace(
+            contact_gain=np.full(4, gains[0]), water_gain=np.full(4, gains[1]), track_film=rng.uniform(2e-4, 6e-4)
+        )
+        depth = float(np.exp(rng.uniform(np.log(0.6e-3), np.log(6e-3))))
+        full = foreign_full(own, depth)
+        v = full - away
+        if V_FULL[0] <= full <= V_FULL[1] and V_LEAST <= v <= 160.0 * KMH:
+            break
+    approach, stay = rng.uniform(9.0, 16.0), 4.0
+    n = round((approach + stay + 2.0) / DT)
+    base = own.l_f + own.l_r
+    fine, slow, _ = build_road("country", rng, v * n * DT + 300.0, Place())
+    first, last = round(v * approach), round(v * (approach + stay))
+    rough = 1.0 + 0.1 * np.convolve(rng.standard_normal(last - first), np.full(5, 5**-0.5), mode="same")
+    slow[first:last, 2] = depth * rng.uniform(0.6, 1.0) * rough
+    slow[first:last, 3] = depth * rough
+    style = np.array([0.3, 0.5, 0.5, 0.03, 0.15, 0.2, 0.4])
+    knows = np.array(
+        [vehicle.mass, 0.5 * vehicle.air_density * vehicle.drag_area, vehicle.rolling_resistance, vehicle.r_e_r]
+    )
+    noise = NOISES[int(rng.integers(len(NOISES)))]
+    still = np.zeros(n)
+    rows = drive_along(
+        np.full(n + 200, v), np.zeros(n + 200), still, 0.06 * rng.standard_normal(n), still, gusts(noise, n, rng), fine,
+        slow, own, NO_ODD, style, knows,
+    )  # fmt: skip
+    messages = measure(rows, own, {}, noise, rng)
+    t = np.arange(0.05, n * DT - 0.05, DT)
+    columns = {s: np.interp(t, m.t, x) for m in messages for s, x in m.columns.items()}
+    way = np.interp(t, np.arange(n) * DT, rows[:, ROWS["way"]]) + base
+    on = t[(way > first) & (way < last)] - t[0]
+    note = f"{seed} foreign, contact {gains[0]:.2f}, water {gains[1]:.2f}, {1e3 * depth:.1f} mm, {noise}"
+    return Pass(columns, vehicle, full, (float(on[0]), float(on[-1])), drive, depth, note)
