@@ -66,8 +66,8 @@ def detect(
     with run.hearing() as hear:
         result = detect(
             drive, thresholds=run.thresholds, model=run.model, history=history, configuration=configuration,
-            reference=reference, margin=margin, windows=out, whole=write is not None, samples=out is not None or write is not None,
-            progress=hear,
+            reference=reference, margin=margin, windows=out, whole=write is not None,
+            samples=out is not None or write is not None, progress=hear,
         )  # fmt: skip
         hear("writing")
         if out is not None:
