@@ -125,7 +125,8 @@ def _end_of_contact(tyre: _Tyres, stop: FloatArray, h: FloatArray, F_z: float, r
 def _prior(tyre: _Tyres) -> FloatArray:
     """How likely each full speed and water is before any evidence, (full speeds, waters).
 
-    Of tyres and pressures that a car may have, by three laws that disagree: the simulator's, Gallaway's, USF's.
+    Of tyres and pressures that a car may have, by three laws that disagree: the
+    simulator's, that of [gallaway1979], and `usf_speed`.
     """
     laws = (
         STOPS_AT * tyre.full(DEPTHS),
