@@ -43,7 +43,7 @@ KNOWN_PRIOR, SHAPE_PRIOR, ROAD_PRIOR = 0.03, 0.01, 0.2
 MOST_BLOCKS = 12000  # of 0.1 s that compete; a longer drive does with its best 20 min
 FORCE_N = 100.0  # of the force whose response stands for any force
 TOLERATED = ("v_x", "torque", "a_y", "a_x")  # coordinates along which a car and its simulation differ anyway
-CHUNK, PIECE = 4096, 512  # entries of rows that are multiplied together, in double and in single precision
+CHUNK = 4096  # entries of rows that are multiplied together
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,9 +289,9 @@ def _tolerance(evidence: Evidence, made: Sequence[Shape], blocks: Sequence[Block
 
 
 def products(rows: npt.NDArray[np.float32]) -> FloatArray:
-    """Inner products of single-precision rows; of short pieces in single precision, their sum in double."""
+    """Inner products of single-precision rows, in double precision: else large ones would not be positive definite."""
     total = np.zeros((len(rows), len(rows)))
-    for i in range(0, rows.shape[1], PIECE):
-        x = np.ascontiguousarray(rows[:, i : i + PIECE])
+    for i in range(0, rows.shape[1], CHUNK):
+        x = rows[:, i : i + CHUNK].astype(np.float64)
         total += x @ x.T
     return total

@@ -42,8 +42,8 @@ def test_json_is_one_document(whole):
     assert document["drives"]["evaluated"] == 4
     assert list(document["drives"]["failed"]) == ["broken.mf4"]
     joint = document["detectors"]["joint_criteria"]
-    assert joint["full"]["episodes"] == 1
-    assert joint["full"]["found"] == 1
+    assert joint["full"]["episodes"] == 2  # both deep lanes stop a wheel
+    assert joint["full"]["found"] == 2
     assert joint["full"]["latency_median_s"] < 0.5
     assert joint["false_alarms"]["count"] == 0
     assert joint["false_alarms"]["hours"] * 3600 == pytest.approx(4 * 12.0 - 3 * (3.5 + 1.0), abs=0.5)

@@ -106,12 +106,12 @@ def test_a_table_holds_states_and_averages_what_is_faster():
     grid = np.arange(5) * 100_000_000
     fast = np.arange(41) * 10_000_000
     step = (np.arange(41) >= 15).astype(float)
-    assert _onto(grid, fast, "on_water", step).tolist() == [0.0, 0.0, 1.0, 1.0, 1.0]
+    assert _onto(grid, fast, {"on_water": step})["on_water"].tolist() == [0.0, 0.0, 1.0, 1.0, 1.0]
     slow = np.arange(3) * 150_000_000
-    assert _onto(grid, slow, "on_water", np.array([0.0, 1.0, 0.0])).tolist() == [0.0, 0.0, 1.0, 0.0, 0.0]
+    assert _onto(grid, slow, {"on_water": np.array([0.0, 1.0, 0.0])})["on_water"].tolist() == [0.0, 0.0, 1.0, 0.0, 0.0]
     noisy = np.where(np.arange(41) % 2, 1.0, -1.0) + 7.0
-    np.testing.assert_allclose(_onto(grid, fast, "a_x", noisy)[1:-1], 7.0)
-    ramp = _onto(grid, slow, "a_x", np.array([0.0, 3.0, 6.0]))
+    np.testing.assert_allclose(_onto(grid, fast, {"a_x": noisy})["a_x"][1:-1], 7.0)
+    ramp = _onto(grid, slow, {"a_x": np.array([0.0, 3.0, 6.0])})["a_x"]
     np.testing.assert_allclose(ramp[:4], [0.0, 2.0, 4.0, 6.0])
     assert np.isnan(ramp[4])
 

@@ -36,7 +36,7 @@ def made(t, v, a):
     """The drive that a car as in its file would log."""
     force = CAR.mass * (a + G * CAR.rolling_resistance) + 0.5 * CAR.air_density * CAR.drag_area * v * v
     wheels = {f"omega_{w}": v / 0.31 for w in WHEELS}
-    columns = {"t": t, "v_x": v, "a_x": a, "torque_f": np.zeros(t.size), "torque_r": force * 0.30 / 0.9, **wheels}
+    columns = {"t": t, "v_x": v, "a_x": a, "torque_f": np.zeros(t.size), "torque_r": force * 0.31 / 0.9, **wheels}
     return Drive("test", "made", columns, CAR, HERE / "rav4.toml")
 
 
@@ -49,7 +49,7 @@ def change(drive, effect, where=None, **values):
 
 def pull(changed):
     """Force [N] at the road that the change of the rear torque is."""
-    return changed["torque_r"] * CAR.torque_gain / 0.30
+    return changed["torque_r"] * CAR.torque_gain / 0.31
 
 
 def test_a_load_shows_as_mass_times_acceleration_in_the_torque(drive):
@@ -70,7 +70,7 @@ def test_a_load_changes_the_slip_by_the_new_force_over_the_new_stiffness():
     v, a = drive.columns["v_x"], drive.columns["a_x"]
     load = 0.5 * (0.5 * CAR.mass * G + CAR.mass * a * CAR.h_cg / 2.8)
     stiff = CAR.slip_slope_r * load
-    before = 0.5 * drive.columns["torque_r"] * 0.9 / 0.30 - 0.01 * load
+    before = 0.5 * drive.columns["torque_r"] * 0.9 / 0.31 - 0.01 * load
     after = before + 0.5 * 150.0 * (a + G * 0.01) - 0.01 * 150.0 / 1500.0 * load
     expected = (v / 0.31) * (after / (1.1 * stiff) - before / stiff)
     assert got["omega_rl"] == pytest.approx(expected, rel=1e-9)
@@ -102,10 +102,10 @@ def test_air_and_rolling_forces(drive):
 
 def test_a_dragging_brake_is_pulled_by_the_driven_wheels(drive):
     got = change(drive, "brake_drag", "fl", torque=30.0)
-    assert pull(got) == pytest.approx(30.0 / 0.30)
+    assert pull(got) == pytest.approx(30.0 / 0.31)
     assert "omega_fr" not in got
     load = 0.5 * (0.5 * CAR.mass * G - CAR.mass * drive.columns["a_x"] * CAR.h_cg / 2.8)
-    expected = -(30.0 / 0.30) / (CAR.slip_slope_f * load) * drive.columns["v_x"] / 0.31
+    expected = -(30.0 / 0.31) / (CAR.slip_slope_f * load) * drive.columns["v_x"] / 0.31
     assert np.abs(got["omega_fl"] - expected)[MIDDLE].max() < 1e-3
 
 
