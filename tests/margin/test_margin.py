@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from aqualog.detect.detector import Settings
+from aqualog.detect.margin import laws
 from aqualog.detect.margin.laws import COLUMNS, DEPTHS, FULL_SPEEDS, SPEEDS, tables_of
 from aqualog.detect.margin.watch import Least
 from aqualog.detect.stream import detect_drive
+from aqualog.model.tyre import TYRES
 from aqualog.report.drive.document import document
 from aqualog.report.drive.panels import drive_rows
 from tests.drives import CAR, drive, lane
@@ -94,6 +96,12 @@ def test_the_least_of_pieces_is_that_of_the_whole():
     for a, b in ((0, 1), (1, 120), (120, 500)):
         parts.push({n: v[a:b] for n, v in f.items()}, bits[a:b])
     assert whole.result() == parts.result()
+
+
+def test_its_numbers_are_those_of_the_simulated_tyre():
+    tyre = TYRES["worn_summer"]
+    np.testing.assert_allclose(laws.LAW, tyre.water_law, rtol=1e-9)
+    assert (tyre.groove_relief, tyre.h_film, tyre.h_wave) == (laws.RELIEF, laws.H_FILM, laws.H_WAVE)
 
 
 def test_nobody_gets_it_who_has_not_asked_for_it():

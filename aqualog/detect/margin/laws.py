@@ -20,6 +20,7 @@ from aqualog.physics.load import G
 __all__ = ["COLUMNS", "DEPTHS", "FULL_SPEEDS", "SHIFTS", "SPEED_STEP", "Tables", "tables_of"]
 
 KMH = 1.0 / 3.6  # [m/s]
+# detectors do not import the simulator: a test holds these numbers to those of `model.tyre`
 # [m/s] cells of the speed of full aquaplaning, 40 to 206 km/h
 FULL_SPEEDS: FloatArray = 40.0 * KMH * np.exp(np.log(1.048) * np.arange(36, dtype=np.float64))
 DEPTHS = np.array([0.7e-3, 1.7e-3, 4.0e-3, 0.7e-3, 1.7e-3, 4.0e-3])  # [m] cells of the water's depth
@@ -28,11 +29,11 @@ SPEED_STEP = 5.0 * KMH  # [m/s] of the tables, from 0 on
 SPEEDS: FloatArray = SPEED_STEP * np.arange(45, dtype=np.float64)
 L_LEAST = 0.03  # [-] of a contact: less is a wheel that floats
 TYRES = 16
-LAW = WaterLaw(120.5 * KMH, 0.3, 0.58, 2.0e-3, 0.15e-3, 33.5, 3.5)  # as fitted to published figures (`model.tyre`)
+LAW = WaterLaw(120.5 * KMH, 0.3, 0.58, 2.0e-3, 0.15e-3, 33.5, 3.5)  # as fitted to published figures
 LAW_SD = 0.20  # [-] log of a tyre's full speed about it
 TEXTURE = 0.8e-3  # [m] mean texture depth of asphalt
 STOPS_AT = 0.93  # a free wheel stops at about this share of the speed at which its contact ends
-RELIEF, H_FILM, H_WAVE = 0.7, 0.5e-3, 1.3e-3  # [-, m, m] as in `model.tyre`
+RELIEF, H_FILM, H_WAVE = 0.7, 0.5e-3, 1.3e-3  # [-, m, m]
 
 
 class Tables(NamedTuple):

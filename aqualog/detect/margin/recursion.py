@@ -96,20 +96,28 @@ def _gauss(z2, S, clip):  # type: ignore[no-untyped-def]
 
 
 @part
-def _learn(p, g, trust, D, u_f, u_r, noise):  # type: ignore[no-untyped-def]
+def _learn_line(s, at, x, left, lasting, trust):  # type: ignore[no-untyped-def]
+    """Learn offset and slope of a line, `s[at]` and `s[at + 1]`, by Kalman's filter; their covariance follows them.
+
+    `left` is what was seen at x less the line, `lasting` its variance beside the line's, `trust` 0 to 1.
+    """
+    P_m, P_q = s[at + 2] + x * s[at + 3], s[at + 3] + x * s[at + 4]
+    S = P_m + x * P_q + lasting
+    gain_m, gain_q = trust * P_m / S, trust * P_q / S
+    s[at] += gain_m * left
+    s[at + 1] += gain_q * left
+    s[at + 2] -= gain_m * P_m
+    s[at + 4] -= gain_q * P_q
+    s[at + 3] -= gain_m * P_q
+
+
+@part
+def _learn_D(p, g, trust, D, u_f, u_r, noise):  # type: ignore[no-untyped-def]
     """Learn offset and slope of a side's dry slip by as much as the road is dry."""
     f, r = _dry_slip(p, u_f, p.slope_f), _dry_slip(p, u_r, p.slope_r)
-    h = f - r
     both = p.share_axle * min(abs(f), abs(r))
-    P_m, P_q = g[2] + h * g[3], g[3] + h * g[4]
-    S = P_m + h * P_q + p.noise_D**2 + p.noisy**2 * noise + g[6] + both * both
-    z = D - (1.0 + g[1]) * h - g[0]
-    gain_m, gain_q = trust * P_m / S, trust * P_q / S
-    g[0] += gain_m * z
-    g[1] += gain_q * z
-    g[2] -= gain_m * P_m
-    g[4] -= gain_q * P_q
-    g[3] -= gain_m * P_q
+    lasting = p.noise_D**2 + p.noisy**2 * noise + g[6] + both * both
+    _learn_line(g, 0, f - r, D - (1.0 + g[1]) * (f - r) - g[0], lasting, trust)
 
 
 @part
@@ -166,7 +174,7 @@ def _seen(p, m, x, var_l, var_r):  # type: ignore[no-untyped-def]
         h = dry_f - dry_r
         if g[2] > p.anew_most**2:
             # the first value is the offset: radii differ by more than any water takes
-            _learn(p, g, 1.0, D, f, r, var)
+            _learn_D(p, g, 1.0, D, f, r, var)
             continue
         away = D - (1.0 + g[1]) * h - g[0]
         # the side that deviates more: the deeper water
@@ -279,20 +287,6 @@ def _score_other(p, d, o, c, z):  # type: ignore[no-untyped-def]
 
 
 @part
-def _learn_R(p, d, z):  # type: ignore[no-untyped-def]
-    """Learn offset of the resistance and share of the specific force by as much as the road is dry."""
-    P_m, P_q = d[3] + z.force * d[4], d[4] + z.force * d[5]
-    S = P_m + z.force * P_q + p.noise_R**2
-    gain_m, gain_q = d[0] * P_m / S, d[0] * P_q / S
-    left = z.R - d[1]
-    d[1] += gain_m * left
-    d[2] += gain_q * left
-    d[3] -= gain_m * P_m
-    d[5] -= gain_q * P_q
-    d[4] -= gain_m * P_q
-
-
-@part
 def _fill(p, t, m, v, k, a):  # type: ignore[no-untyped-def]
     """Fill what is put out: quantiles of the distance where there is water."""
     wet, L = 0.0, 0.0
@@ -365,10 +359,11 @@ def _step(p, t, m, x, var_l, var_r):  # type: ignore[no-untyped-def]
         for j in range(_NH):
             w[i, j] /= total
     if z.has_R:
-        _learn_R(p, d, z)
+        # offset and share of the specific force; `z.R` has the share taken off
+        _learn_line(d, 1, z.force, z.R - d[1], p.noise_R**2, d[0])
     for side in range(2):
         if not math.isnan(x[3 + side] + x[5 + side] + x[7 + side]):
-            _learn(p, m.sides[side], d[0], x[3 + side], x[5 + side], x[7 + side], var_l if side == 0 else var_r)
+            _learn_D(p, m.sides[side], d[0], x[3 + side], x[5 + side], x[7 + side], var_l if side == 0 else var_r)
     _fill(p, t, m, x[0], k, a)
 
 
