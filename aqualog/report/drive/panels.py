@@ -168,7 +168,7 @@ def _margin(r: DriveResult) -> Row:
         Line(label, VEHICLE, colour, v, width, ("m/s", "km/h")) for label, _, colour, width, v in columns
         if v is not None
     )  # fmt: skip
-    about = "how much faster the car could go; below zero it floats; empty where no water is probable"
+    about = "what is left; below zero it floats; empty without water"
     return Row("Distance to full aquaplaning", about, "km/h", lines, include=(0.0, 30.0), height=150, decimals=0)
 
 
