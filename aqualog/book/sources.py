@@ -152,20 +152,21 @@ def _blanked(text: str, what: re.Pattern[str]) -> str:
     return what.sub(lambda m: re.sub(r"[^\n]", " ", m[0]), text)
 
 
-def names_without_key(text: str, known: Register | None = None) -> list[Citation]:
+def names_without_key(text: str) -> list[Citation]:
     """Names of sources in a text that cites no work of that name; `key` is the name. Headings and links are free."""
-    known = register() if known is None else known
     prose, cited = _blanked(_blanked(text, _CODE), _LINK), {c.key for c in citations(text)}
     missing = []
-    for name, keys in _names(known).items():
-        if not cited & keys:
+    for name, keys in _names().items():
+        if name in prose and not cited & keys:
             found = re.search(rf"(?<!\w){re.escape(name)}(?!\w)", prose)
             missing += [Citation(name, prose.count("\n", 0, found.start()) + 1)] if found else []
     return missing
 
 
-def _names(known: Register) -> dict[str, set[str]]:
+@cache
+def _names() -> dict[str, set[str]]:
     """Names, and the sources that each can mean; a work that a cited reference of the thesis is counts too."""
+    known = register()
     names: dict[str, set[str]] = {}
     for source in known.sources.values():
         numbers = {str(r.number) for r in known.references.values() if r.known and r.source == source.key}

@@ -58,6 +58,7 @@ def without_losses(car):
 # mechanics
 
 
+@pytest.mark.nightly
 def test_nothing_is_lost_or_won_without_losses():
     x = ride(without_losses(car_of()[0]), steady(25.0), coast=True)
     assert x["v_x"][-1] == pytest.approx(25.0, rel=2e-5)
@@ -248,6 +249,7 @@ def test_a_case_is_a_function_of_seed_and_number():
     assert len(one.truth["hidden"]) == 2
 
 
+@pytest.mark.nightly
 def test_sizes_are_raised_until_the_drive_shows_them():
     plan = draw_plan(6, 1, "null", duration_s=30.0)._replace(programme="country", noise="white")
     h = draw("payload_mass", np.random.default_rng(1), 0.3)

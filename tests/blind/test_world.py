@@ -91,6 +91,7 @@ TOGETHER = [(p, list(CARS)[i % len(CARS)]) for i, p in enumerate(PROGRAMMES)]
 TOGETHER += [("mixed", car) for car in CARS if ("mixed", car) not in TOGETHER]
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("programme", "vehicle"), [t for t in TOGETHER if t[0] in cases.EXACT_PROGRAMMES])
 def test_forces_balance_by_the_vehicle_file(programme, vehicle):
     signals, same = clean_pair(Spec(programme, "white", seed=4, vehicle=vehicle, duration_s=SHORT))
@@ -187,6 +188,7 @@ def test_no_size_no_effect(effect):
     assert hidden.frame.equals(nominal.frame)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("effect", POOLS)
 def test_each_size_in_the_pool_is_seen_and_the_weak_ones_less(effect):
     length = {"pressure_loss": 110.0, "drag_patch": 90.0, "hills": 60.0, "speed_hump": 60.0}.get(effect, 30.0)
@@ -426,6 +428,7 @@ def test_labels_tell_the_water_before_it_was_uneven():
     assert np.median(of(rows, "film_fl")[inside] / label[inside]) == pytest.approx(0.5, abs=0.01)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("effect", ["speed_hump", "drag_patch", "gear_loss", "accelerometer_speed"])
 @pytest.mark.parametrize("vehicle", ["compact_fwd", "suv_awd"])
 def test_functions_of_the_unknown_are_what_the_drive_holds(effect, vehicle):

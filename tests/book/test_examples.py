@@ -4,8 +4,18 @@ import pytest
 
 from tests.book import examples
 
+SLOW = {"guide/big_batches.md", "guide/campaign.md"}
+PAGES = [
+    pytest.param(
+        page,
+        id=str(page.relative_to(examples.ROOT)),
+        marks=[pytest.mark.nightly] if any(str(page).endswith(s) for s in SLOW) else [],
+    )
+    for page in examples.pages()
+]
 
-@pytest.mark.parametrize("page", examples.pages(), ids=lambda p: str(p.relative_to(examples.ROOT)))
+
+@pytest.mark.parametrize("page", PAGES)
 def test_examples_are_true(page, tmp_path):
     _, faults = examples.check(page, tmp_path)
     assert not faults, "run `python -m tests.book.examples`\n" + "\n\n".join(map(str, faults))

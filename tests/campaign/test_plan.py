@@ -161,6 +161,7 @@ def test_what_is_in_the_store_is_not_counted_and_nothing_is_hashed(tmp_path, mon
 # --- the command --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.nightly
 def test_a_batch_takes_what_was_foretold(campaign, tmp_path):
     """Wide, since other work on the machine may come and go in between; a wrong unit or a factor of cores shows."""
     env = {**os.environ, "PYTHONWARNINGS": "ignore"}

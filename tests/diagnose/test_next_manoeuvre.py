@@ -118,6 +118,7 @@ def test_wind_and_drag_need_the_way_back(wind):
     assert answer == next_manoeuvre(evidence, rivals, noises, Model())
 
 
+@pytest.mark.nightly
 def test_load_and_torque_gain_are_decided_on_the_scales(monkeypatch):
     """Without scales, the best run is no promise; driven, it settles this load."""
     truth = model("payload_mass", delta_mass=60.0)

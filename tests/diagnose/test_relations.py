@@ -39,7 +39,13 @@ def test_a_dragging_brake_is_a_rolling_resistance_in_the_relation():
     assert as_sets(imitations(asked, [1, 3])) == {frozenset((0, 1)), frozenset((0, 3))}
 
 
-@pytest.mark.parametrize("hidden", [term("accelerometer_bias", "a_x", bias=0.05), term("road_grade", grade=0.005)])
+@pytest.mark.parametrize(
+    "hidden",
+    [
+        term("accelerometer_bias", "a_x", bias=0.05),
+        pytest.param(term("road_grade", grade=0.005), marks=pytest.mark.nightly),
+    ],
+)
 def test_a_log_that_cannot_part_three_lists_them(monkeypatch, hidden):
     three = ("accelerometer_bias@a_x", "road_grade", "rolling_resistance")
     # radii are not known to the millimetre: else the slip that rolling costs would part them

@@ -63,7 +63,9 @@ def test_a_seed_is_a_drive(name):
 
 
 @pytest.mark.parametrize("name", SITUATIONS)
-@pytest.mark.parametrize("pool", [TUNING_POOL, SCORING_POOL], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "pool", [TUNING_POOL, pytest.param(SCORING_POOL, marks=pytest.mark.nightly)], ids=["tuning", "scoring"]
+)
 def test_wheels_float_where_they_should(name, pool):
     d = draw(name, 11, pool)
     c = simulate(d.scenario, d.model).truth.columns

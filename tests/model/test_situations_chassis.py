@@ -26,7 +26,9 @@ def sum_of(c, stem):
     return sum(c[f"{stem}_{w}"] for w in WHEELS)
 
 
-@pytest.mark.parametrize("pool", [TUNING_POOL, SCORING_POOL], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "pool", [TUNING_POOL, pytest.param(SCORING_POOL, marks=pytest.mark.nightly)], ids=["tuning", "scoring"]
+)
 @pytest.mark.parametrize("name", CHASSIS)
 def test_no_joint_alarm(name, pool):
     for seed in (1, 2):

@@ -47,6 +47,7 @@ ONE_MISSED = pytest.mark.xfail(strict=True, reason="on the mended water one part
 
 
 @ONE_MISSED
+@pytest.mark.nightly
 def test_c70_in_part(table):
     """A coarse measurement changes nothing. Without one, wheels in antilock braking are the only reference there is."""
     like = {key: row.is_like(table[key[0], "as measured"]) for key, row in table.items()}
@@ -55,6 +56,7 @@ def test_c70_in_part(table):
 
 
 @ONE_MISSED
+@pytest.mark.nightly
 def test_c70_the_joint_detector_needs_no_velocity(table):
     rows = [row for (d, _), row in table.items() if d == "joint_criteria"]
     assert len(rows) == len(VARIANTS)
@@ -64,6 +66,7 @@ def test_c70_the_joint_detector_needs_no_velocity(table):
         assert row.false_alarms == 0
 
 
+@pytest.mark.nightly
 def test_c70_the_alarms_on_top_are_those_of_antilock_braking(records):
     for variant in WITHOUT:
         for detector in ("spin_down", "spin_up"):

@@ -75,6 +75,7 @@ def test_variants_hold_the_detectors_own_bits():
         assert bits[more].sum() >= bits[less].sum()
 
 
+@pytest.mark.nightly
 def test_sign_of_the_speed_difference(monkeypatch):
     monkeypatch.setattr(wheels, "_PER_WATER", 4)
     more = Plan(range(1, 5))
@@ -89,6 +90,7 @@ def test_sign_of_the_speed_difference(monkeypatch):
     assert wheels._sign_of_speed(more).verdict == NOT_REPRODUCED
 
 
+@pytest.mark.nightly
 def test_the_gate(few, monkeypatch):
     found = joint._gate(few)
     assert found.verdict == REPRODUCED
@@ -98,6 +100,7 @@ def test_the_gate(few, monkeypatch):
     assert joint._gate(few).verdict == NOT_REPRODUCED
 
 
+@pytest.mark.nightly
 def test_braking_forces(few, monkeypatch):
     assert joint._spin_down(few).verdict in (REPRODUCED, DIFFERENCE)
     without = joint.variants
@@ -105,6 +108,7 @@ def test_braking_forces(few, monkeypatch):
     assert joint._spin_down(few).verdict == NOT_REPRODUCED
 
 
+@pytest.mark.nightly
 def test_resistance_is_its_own_indicator(few):
     assert joint._resistance(few).verdict in (REPRODUCED, DIFFERENCE)
 
