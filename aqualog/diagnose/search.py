@@ -28,6 +28,7 @@ from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
 from aqualog.diagnose.subsets import compatible, imitations
 from aqualog.diagnose.unexplained import unknown_forms
+from aqualog.diagnose.words import listed, name_of
 from aqualog.model.term import Model
 
 __all__ = ["Found", "Option", "search", "sharpened", "simulated"]
@@ -104,7 +105,8 @@ def search(
     forms = unknown_forms(arena, posterior, seed=seed)
     if forms:
         return Found(test, gram, calibration, arena, posterior, forms)
-    tell("known effects", 0.6)
+    so_far = _so_far(arena, posterior) if test.p_value <= level else "nothing beyond noise"
+    tell(f"{so_far}; comparing known effects", 0.6)
     if test.p_value > level:
         return Found(test, gram, calibration, arena, posterior)
     roads = [
@@ -113,10 +115,20 @@ def search(
     arena = known_only(arena, roads)
     posterior = compete(arena)
     arena, posterior = _repeated(evidence, arena, posterior, model)
-    tell("refitting in the simulator", 0.7)
+    tell(f"{_so_far(arena, posterior)}; refitting in the simulator", 0.7)
     options = _refitted(evidence, arena, posterior, model)
     options = sorted(options, key=lambda o: -o.evidence)
     return Found(test, gram, calibration, arena, posterior, (), tuple(options))
+
+
+def _so_far(arena: Arena, posterior: Posterior) -> str:
+    """The likeliest set for a user who waits: `so far payload mass (0.93)`."""
+    blocks = [arena.blocks[m] for m in posterior.best]
+    known = [arena.evidence.asked[b.tag] for b in blocks if b.kind == "effect"]
+    names = [name_of(h.effect.name, h.where) for h in known]
+    forms = ["an unknown form"] if len(known) < len(blocks) else []
+    said = listed([*names, *forms]) if blocks else "no effect"
+    return f"so far {said} ({float(posterior.probability[0]):.2f})"
 
 
 def _effects(arena: Arena, members: Members) -> list[int]:

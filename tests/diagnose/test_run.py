@@ -1,6 +1,7 @@
 """The whole diagnosis on short simulated drives, asked about few effects."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -202,6 +203,16 @@ def test_progress_is_told_and_rises():
     assert len({t for t, _ in seen}) >= 3
     assert np.all(np.diff(shares) > -1e-9)
     assert 0.0 <= shares[0] <= shares[-1] <= 1.0
+    assert any("nothing beyond noise" in t for t, _ in seen)
+
+
+def test_a_first_answer_is_shown_while_the_rest_is_done():
+    seen = []
+    log = noisy(term("payload_mass", delta_mass=250.0))
+    diagnose([("a", log)], CAR, options=QUICK, progress=lambda text, share: seen.append((text, share)))
+    first = next(i for i, (t, _) in enumerate(seen) if "so far" in t)
+    assert re.search(r"so far payload mass \((0\.\d\d|1\.00)\)", seen[first][0])
+    assert seen[first][1] < 0.7
 
 
 def test_views_hold_the_residual_before_and_after():
