@@ -17,8 +17,9 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import Arena, known_only, make_arena
+from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.compete import Members, Posterior, compete, fitted
-from aqualog.diagnose.competition import COARSE, added, start
+from aqualog.diagnose.competition import COARSE, added, forgiving, start
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import with_elements
 from aqualog.diagnose.evidence import Evidence, make_evidence, tolerant
@@ -37,6 +38,8 @@ AROUND = 2  # times that the competition is repeated around its best set
 COVERED, REFITTED = 0.98, 6  # share of the posterior that is refitted, and the most sets
 # share of the best set's gain by which the form of a water law may have misjudged another effect of water
 FORM = 0.3
+NEAR = 10.0  # [nats] behind the best set, within which a single effect is refitted
+DOUBT = 0.05  # share of what an effect shows that a channel may show more or less than in the simulator (K)
 HALF = 0.5  # probability from which a slope or bank of the road is marginalised
 UNUSUAL = 3.0  # of its prior's standard deviations, beyond which a value is not listed by a relation alone
 
@@ -203,6 +206,8 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     for own in imitations(evidence.asked, _effects(arena, best)):
         if compatible(evidence, own):
             equal.add(as_blocks(own))
+    # one effect that two others imitate: its evidence rests on how well the simulator knows what it does
+    chosen += [m for m, e in posterior.sets if len(m) == 1 < len(best) and e > linear[best] - NEAR]
     chosen = [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m]
     measure = metric(arena, posterior.weighings, coarse=COARSE)
     y = measure.rows([r[None] for r in evidence.residuals])
@@ -271,18 +276,51 @@ def _evidence(
     `nothing`: half the sum of squares without any effect.
     """
     columns = [c for h in own for c in arena.evidence.columns[h]]
+    off = _off(found, model)
     J = measure.rows(found.signatures) * arena.sd[columns, None]
-    y = measure.rows([r[None] for r in found.residuals])[0] + (_off(found, model) / arena.sd[columns]) @ J
-    rows = np.concatenate([J, y[None]])
+    y = measure.rows([r[None] for r in found.residuals])[0] + (off / arena.sd[columns]) @ J
+    doubtful = _doubtful(arena, found, off)
+    doubts = measure.rows(doubtful) if len(doubtful[0]) else J[:0]
+    rows = np.concatenate([J, doubts, y[None]])
     state = start(measure.inner(rows, rows))
     at = 0
     by_tag = {b.tag: b for b in arena.blocks}
     loss = 0.5 * float(state.inner[-1, -1])
+    if len(doubts):
+        state = forgiving(state, range(len(J), len(J) + len(doubts)), DOUBT)
     for i, h in enumerate(own):
         b = by_tag[h]
         state = added(state, i, replace(b, columns=tuple(range(at, at + len(b.columns)))))
         at += len(b.columns)
     return state.evidence + nothing - loss
+
+
+def _doubtful(arena: Arena, found: Refit, off: FloatArray) -> list[FloatArray]:
+    """What each value shows in one channel, in that channel and in each other one of its unit, where it is large there.
+
+    (m, C, n) of each drive. No simulator has a car's response exactly: a body that pitches on a slope lets the
+    accelerometer show more than the slope, against the wheels and against the torque. A second effect must not make up
+    for that.
+    """
+    channels = arena.parts[0].channels
+    count = len(channels)
+    size, noise = np.zeros((off.size, count)), np.zeros(count)
+    for p in arena.parts:
+        size += ((off[:, None, None] * found.signatures[p.drive][..., p.at][..., p.mask]) ** 2).sum(axis=-1)
+        noise += (found.residuals[p.drive][:, p.at][..., p.mask] ** 2).sum(axis=-1)
+    units = [CHANNELS[c].unit for c in channels]
+    large = [
+        (k, c, to)
+        for k, c, to in np.ndindex(off.size, count, count)
+        if units[c] == units[to] and size[k, c] > noise[to]
+    ]
+    out = []
+    for own in found.signatures:
+        each = np.zeros((len(large), *own.shape[1:]))
+        for i, (k, c, to) in enumerate(large):
+            each[i, to] = off[k] * own[k, c]
+        out.append(each)
+    return out
 
 
 def _twins(evidence: Evidence, own: Sequence[int]) -> list[tuple[int, ...]]:
