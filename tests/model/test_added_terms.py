@@ -8,9 +8,9 @@ from scipy.optimize import curve_fit
 
 from aqualog.model.scenario import Kick, Steering
 from aqualog.model.tyre import TYRES
-from aqualog.physics.load import HOP
+from aqualog.physics.load import HOP, G
 from aqualog.physics.steering import STEERING, held_angle
-from tests.model.test_kernel import SEDAN, col, imbalance, lane, raw, scenario
+from tests.model.test_kernel import SEDAN, col, imbalance, lane, raw, scenario, truth
 
 SWINGS = replace(TYRES["worn_summer"], torsion_frequency=38.0, torsion_damping=0.05)
 ALL = {"tyre_front": SWINGS, "tyre_rear": SWINGS, "unevenness": 64e-6, "steering_friction": 150.0}
@@ -66,6 +66,7 @@ def test_a_slow_torque_turns_rim_and_belt_as_one():
 def test_what_an_uneven_road_takes_and_how_it_loads(v):
     """White noise on the slope: pi² n_0² G_d k of each wheel, at any speed; the load's variance by the hop alone."""
     rows, _ = raw(scenario(speed=((0.0, v),), unevenness=256e-6, duration_s=200.0))
+    assert col(rows, "F_z")[0] == pytest.approx(0.5 * SEDAN.mass * G * SEDAN.l_r / SEDAN.wheelbase)  # no transient
     climb = np.mean([col(rows, "climb", i)[2000:].mean() for i in range(4)])
     assert climb == pytest.approx(np.pi**2 * 0.01 * 256e-6 * HOP.stiffness, rel=0.12)
     rate = 2.0 * np.pi**2 * 0.01 * 256e-6 * v
@@ -81,15 +82,18 @@ def test_friction_holds_the_steering_after_a_jolt_and_the_yaw_with_it():
     assert np.abs(col(free, "yaw_rate")[-500:]).max() < 1e-6 < np.abs(col(free, "yaw_rate")).max()
     held = col(rows, "held")[-500:]
     assert 0.3 * MOST < held.min() < held.max() < MOST
-    gain = 28.0 / (SEDAN.wheelbase + 28.0**2 * (1 / 16 - 1 / 20) / 9.81)
+    gain = 28.0 / (SEDAN.wheelbase + 28.0**2 * (1 / 16 - 1 / 20) / G)
     assert col(rows, "yaw_rate")[-500:].mean() == pytest.approx(gain * held.mean(), rel=0.05)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_sliding_rack_follows_with_all_of_its_friction(sign):
     turn = Steering(sign * 0.03, 4.0, kind="hold")
-    rows, _ = raw(scenario(speed=((0.0, 15.0),), steering=turn, duration_s=2.5, steering_friction=150.0))
-    assert col(rows, "held")[2000] == pytest.approx(-sign * MOST)
+    free = scenario(speed=((0.0, 15.0),), steering=turn, duration_s=2.5)
+    rubs = replace(free, steering_friction=150.0)
+    assert col(raw(rubs)[0], "held")[2000] == pytest.approx(-sign * MOST)
+    more, without = (truth(sc)[1]["steering_torque"][2000] for sc in (rubs, free))
+    assert more - without == pytest.approx(sign * STEERING.ratio * 150.0, rel=0.15)  # the angle is 2 % less, too
 
 
 def test_friction_takes_energy_around_any_course():
