@@ -65,6 +65,9 @@ _ALL = [
     _number("", "wind_profile", "s, km/h", None, -150.0, 150.0, "head wind over time, on top of `head_wind_kmh`"),
     _number("", "drive_share_profile", "s, -", None, 0.0, 2.0, "share of the driver's torque that arrives"),
     _text("", "brakes", "plain", "plain, antilock"),
+    _number("", "unevenness_cm3", "cm^3", 0.0, 0.0, 1024.0, "of the road, G_d(n_0) of [iso8608_2016]: 16 very good, 64 "
+        "good, 256 average"),
+    _number("", "steering_friction_n", "N", 0.0, 0.0, 1000.0, "dry friction of the rack: 100-200 on cars (K)"),
     _number("", "water_scatter", "-", 1.0, 0.0, 3.0, "scales how the contact varies on water; 0: even"),
     _number("lane", "start_s", "s", None, 0.0, _DAY, "time at which the lane begins; or `start_m`"),
     _number("lane", "end_s", "s", None, 0.0, _DAY, "time at which it ends, also beyond the drive; or `end_m`"),
@@ -150,6 +153,8 @@ def load_scenario(path: Path) -> Scenario:
         split_rear=_profile(file, "split_profile"),
         grade=_grade(file),
         head_wind=_value(file, "head_wind_kmh") / 3.6,
+        unevenness=_value(file, "unevenness_cm3") * 1e-6,
+        steering_friction=_value(file, "steering_friction_n"),
         water_scatter=_value(file, "water_scatter"),
         wind=tuple((t, v / 3.6) for t, v in _profile(file, "wind_profile")),
         drive_share=_profile(file, "drive_share_profile"),

@@ -170,7 +170,7 @@ def _columns(rows: FloatArray, plant: Plant, scenario: Scenario, *, rods: bool) 
         columns[f"angle_{w}"] = angle[i]
         columns[f"torque_{w}"] = torque[i] / plant.torque_gain
     if rods:
-        names: Sequence[str] = ("F_x", "F_y", "F_z", "wave_drag", "aligning", "braking", "contact")
+        names: Sequence[str] = ("F_x", "F_y", "F_z", "wave_drag", "climb", "aligning", "braking", "contact")
         columns |= steering_columns({n: wheel_columns(rows, n) for n in names}, plant, scenario)
     return columns
 

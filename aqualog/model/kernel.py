@@ -33,8 +33,8 @@ from aqualog.model.state import (
     YAW_RATE,
     S,
 )
-from aqualog.model.wheel import Now, Place, ground_under, wheel
-from aqualog.physics import load, resistance, rolling, water
+from aqualog.model.wheel import Now, Place, ground_under, over_road, wheel
+from aqualog.physics import load, resistance, rolling, steering, water
 from aqualog.physics.load import G
 
 __all__ = ["Controls", "integrate", "run"]
@@ -62,6 +62,8 @@ class Controls(NamedTuple):
     scatter: float
     antilock: bool = False  # the brakes release a wheel that is about to lock
     kicks: bool = False  # the road has kerbs or holes
+    is_uneven: bool = False  # the road has heights
+    steering_friction: float = 0.0  # [N] of the rack
     follow: float = 0.0  # [1/s] without a driver: how fast the speed is drawn to `v_target`; 0: runs free
 
 
@@ -91,15 +93,19 @@ _grade_force = inlined(resistance.grade_force)
 _cornering_drag = inlined(resistance.cornering_drag)
 _rolling_force = inlined(resistance.rolling_resistance_force)
 _warm_up_factor = inlined(rolling.warm_up_factor)
+_held_angle = inlined(steering.held_angle)
+_kingpin_moment = inlined(steering.kingpin_moment)
+_PER_FORCE = 1.0 / (steering.STEERING.stiffness * steering.STEERING.arm)  # [rad/N] of the column, at the road wheels
 
 
 # memory of a step: state `y`, derivative `f` and stiff Jacobian `jac` there, the stages with the Jacobian of the first,
-# the record `out`; of each wheel the share of the brake that is held off, and torque on top of the driver's [N·m]
+# the record `out`; of each wheel the share of the brake that is held off, and torque on top of the driver's [N·m]; the
+# angle at which the rack stands and how far the rods' force bends the column [rad]
 _MEMORY = np.dtype([
     *((name, np.float64, N_STATES) for name in ("y", "f", "k1", "k2", "rest")),
     *((name, np.float64, N_JACOBIAN) for name in ("jac", "jac_0")),
     ("out", np.float64, WIDTH), *((name, np.float64, 4) for name in ("released", "releasing", "applied")),
-    ("is_recorded", np.float64),
+    *((name, np.float64) for name in ("is_recorded", "rack", "bent")),
 ])  # fmt: skip
 
 
@@ -128,7 +134,11 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
     drag = _drag(y, c, p, wheels, knots)
     slope_down = _grade_force(grade, p.mass)
     leak = min(max((t - p.leak_start) / p.leak_time, 0.0), 1.0)
-    steer = c.steer + y[STEER]
+    turned = c.steer + y[STEER]
+    held = 0.0
+    if p.steering_friction > 0.0:
+        held = _held_angle(m.rack, turned + m.bent, p.steering_friction, _PER_FORCE)
+    steer = turned + held
     warm = _warm_up_factor(t, p.warmup_extra, p.warmup_time)
     now = Now(t, steer, np.cos(steer), np.sin(steer), leak)
     loads = _loads(y[A_X], y[A_Y], p.mass, p.l_f, p.l_r, p.h_cg, p.track)
@@ -147,7 +157,9 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
     moment = 0.0
     for i in range(4):
         q = wheels[i]
-        ground = ground_under(i, warm, loads[i], front if i < 2 else rear, p, q, lanes, fields, track)
+        place = front if i < 2 else rear
+        weight = over_road(i, loads[i], place.way, m, p, fields) if p.is_uneven > 0.0 else (loads[i], 0.0)
+        ground = ground_under(i, warm, weight, place, p, q, lanes, fields, track)
         forces = wheel(i, now, ground, command, m, p, q)
         sum_x += forces.x
         sum_y += forces.y
@@ -163,7 +175,8 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
         out = m.out
         out[AT.v_x], out[AT.v_y], out[AT.yaw_rate], out[AT.psi] = y[V_X], y[V_Y], y[YAW_RATE], y[PSI]
         out[AT.position], out[AT.y_lat], out[AT.a_x], out[AT.a_y] = position, y[Y_LAT], a_x, a_y
-        out[AT.steer_angle], out[AT.drive_torque], out[AT.brake_torque] = steer, command.drive, command.brake
+        out[AT.steer_angle], out[AT.drive_torque], out[AT.brake_torque] = turned, command.drive, command.brake
+        out[AT.held] = held
         out[AT.grade], out[AT.lane_front], out[AT.lane_rear] = grade, front.lane, rear.lane
         out[AT.drag], out[AT.nudge] = drag, nudge
 
@@ -211,17 +224,17 @@ def _move(m, a_x, a_y, uphill, turning, nudge, roll_time):  # type: ignore[no-un
 
 @compiled
 def _solve(f, jac, h, k):  # type: ignore[no-untyped-def]
-    """Solve (1 - h J) k = f: J is diagonal but for v_x and the wheels, which are coupled."""
+    """Solve (1 - h J) k = f: J is diagonal but for v_x and the wheels with their belts, which are coupled."""
     for i in range(N_STATES):
         k[i] = f[i] / (1.0 - h * jac[i])
     right = f[V_X]
     left = 1.0 - h * jac[V_X]
-    for i in range(4):
+    for i in range(8):
         own = 1.0 - h * jac[OMEGA + i]
         right += h * jac[J_V + i] * f[OMEGA + i] / own
         left -= h * h * jac[J_V + i] * jac[J_W + i] / own
     k[V_X] = right / left
-    for i in range(4):
+    for i in range(8):
         k[OMEGA + i] = (f[OMEGA + i] + h * jac[J_W + i] * k[V_X]) / (1.0 - h * jac[OMEGA + i])
 
 
@@ -235,6 +248,25 @@ def _leave_track(track, written, m, wheels, ds):  # type: ignore[no-untyped-def]
             h_track = wheels[2 + side].h_track
             track[j, 1 + side] = _residual_film(m.out[AT.film + side], m.out[AT.contact + side], h_track)
     return max(written, here)
+
+
+@part
+def _settle_rack(m, wheels, friction):  # type: ignore[no-untyped-def]
+    """Let the rack slide where the step recorded more than its friction holds. Changes `m.rack` and `m.bent`.
+
+    The rods' force is a step late: it changes little within one, and the column gives way by a fifth of its change.
+    """
+    out, moment = m.out, 0.0
+    for i in range(2):
+        outward = 1.0 - 2.0 * i
+        force = out[AT.F_x + i] - out[AT.wave_drag + i] - out[AT.climb + i]
+        moment += outward * _kingpin_moment(
+            force, outward * out[AT.F_y + i], out[AT.F_z + i], outward * out[AT.aligning + i], out[AT.braking + i],
+            wheels[i].r_l, steering.STEERING,
+        )  # fmt: skip
+    m.bent = moment / steering.STEERING.arm * _PER_FORCE
+    free = out[AT.steer_angle] + m.bent
+    m.rack = free + _held_angle(m.rack, free, friction, _PER_FORCE)
 
 
 @part
@@ -276,6 +308,8 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
             written = _leave_track(track, written, m, wheels, p.ds)
         if p.antilock > 0.0:
             antilock(m, dt)
+        if p.steering_friction > 0.0:
+            _settle_rack(m, wheels, p.steering_friction)
         for i in range(N_JACOBIAN):
             m.jac_0[i] = m.jac[i]
         _solve(m.f, m.jac_0, h, m.k1)

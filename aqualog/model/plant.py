@@ -44,7 +44,10 @@ class Plant(NamedTuple):
     r_e: FloatArray
     r_l: FloatArray
     radius_growth: FloatArray
-    inertia: FloatArray
+    inertia: FloatArray  # [kg·m²] of the rim, and of the belt too if they turn as one
+    belt_inertia: FloatArray  # [kg·m²] 0: rim and belt turn as one
+    torsion_stiffness: FloatArray
+    torsion_damping: FloatArray
     driveline: FloatArray  # [kg·m²] turns with the mean of both wheels of an axle
     r_w: FloatArray
     warmup_extra: float
@@ -132,12 +135,18 @@ def build_plant(
     as_they_are |= {
         name: np.array([getattr(vehicle, name)(w) for w in WHEELS]) for name in ("r_e", "r_l", "inertia", "driveline")
     }
+    belt = np.where(of("torsion_frequency") > 0.0, of("belt_share"), 0.0)
+    whole, swing = as_they_are["inertia"], 2.0 * np.pi * of("torsion_frequency")
+    as_they_are["inertia"] = rim = whole * (1.0 - belt)
     as_they_are |= {name: of(name) for name in _OF_TYRES}
     nothing: dict[str, Any] = dict.fromkeys(_ADDED, 0.0) | {name: np.zeros(4) for name in _ADDED_AT_WHEELS}
     return Plant(
         **as_they_are,
         **nothing,
         I_zz=vehicle.mass * vehicle.l_f * vehicle.l_r,  # radius of gyration sqrt(l_f l_r) (K)
+        belt_inertia=whole * belt,
+        torsion_stiffness=rim * swing**2,
+        torsion_damping=2.0 * of("torsion_damping") * rim * swing,
         roll_time=0.08,  # [s] pitch and roll of a car settle in about a tenth of a second (K)
         brake_split=0.5 * np.array([brake_f, brake_f, 1.0 - brake_f, 1.0 - brake_f]),
         power=POWER_PER_MASS * vehicle.mass,

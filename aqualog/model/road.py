@@ -9,12 +9,14 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.records import FloatArray
 from aqualog.model.scenario import Kick, Lane, Scenario, Surface
+from aqualog.physics.load import unevenness_rms
 
-__all__ = ["DRY", "Road", "at_position", "build_road", "stretch_at", "track_row"]
+__all__ = ["DRY", "Road", "at_position", "build_road", "rise_at", "stretch_at", "track_row"]
 
 DS = 0.1  # [m] grid of the fields
 DS_LONG = 0.5  # [m] on drives beyond 20 km
 DEPTH_LENGTH, BUMP_LENGTH, TRACK_LENGTH = 5.0, 0.3, 1.0  # [m] correlation: depth of water, bumps, film in a track (K)
+HEIGHT_LENGTH = 5.0  # [m] waves beyond 30 m move body and wheel alike, so that they hardly change the load (K)
 
 
 # columns of a stretch
@@ -24,16 +26,17 @@ ROLLING, ROUGHNESS, LANE_MU, LANE_COMPLIANCE = range(7, 11)  # a negative fricti
 SURFACE_WIDTH = 4
 _LANE_WIDTH = 7 + 2 * SURFACE_WIDTH
 # columns of the fields; of sides and wheels from the left, from fl
-CONTACT_ROAD, CONTACT_WHEEL, DEPTH, BUMPS, GRADE, KICK_TORQUE, KICK_LOAD, TRACK = 0, 2, 6, 8, 10, 11, 13, 15
-_FIELD_WIDTH = 17
+CONTACT_ROAD, CONTACT_WHEEL, DEPTH, BUMPS, GRADE, KICK_TORQUE, KICK_LOAD, TRACK, HEIGHT = 0, 2, 6, 8, 10, 11, 13, 15, 17
+_FIELD_WIDTH = 19
 
 
 class Road(NamedTuple):
-    """Stretches (k, 15) and fields (m, 17) over the position of the front axle, from 0, `ds` apart.
+    """Stretches (k, 15) and fields (m, 19) over the position of the front axle, from 0, `ds` apart.
 
     The last stretch of `lanes` that holds a point applies; outside all is dry asphalt. The fields of contact, depth,
     bumps and the film in a track have unit variance: both axles meet `CONTACT_ROAD`, each wheel adds `CONTACT_WHEEL`.
-    The slope angle is in rad, uphill positive; kerbs and holes give torque [N·m] and wheel load [N] of either side.
+    The slope angle is in rad, uphill positive; the height under left and right wheels in m; kerbs and holes give torque
+    [N·m] and wheel load [N] of either side.
     """
 
     ds: float
@@ -66,15 +69,18 @@ def build_road(scenario: Scenario, length: float) -> Road:
         ],
         dtype=np.float64,
     ).reshape(len(scenario.lanes), _LANE_WIDTH)  # fmt: skip
-    streams = [np.random.default_rng(child) for child in np.random.SeedSequence([scenario.seed, 1]).spawn(12)]
+    streams = [np.random.default_rng(child) for child in np.random.SeedSequence([scenario.seed, 1]).spawn(14)]
     front, rear = scenario.tyre_front.scatter_length, scenario.tyre_rear.scatter_length
     fields = np.zeros((m, _FIELD_WIDTH))
     if any(lane.depth_left > 0 or lane.depth_right > 0 for lane in scenario.lanes):
         lengths = [front, front, front, front, rear, rear, DEPTH_LENGTH, DEPTH_LENGTH]
         _fill(fields, CONTACT_ROAD, streams[:8], ds, lengths)
-        _fill(fields, TRACK, streams[10:], ds, [TRACK_LENGTH, TRACK_LENGTH])
+        _fill(fields, TRACK, streams[10:12], ds, [TRACK_LENGTH, TRACK_LENGTH])
     if any(_roughness(lane) > 0 for lane in scenario.lanes):
         _fill(fields, BUMPS, streams[8:10], ds, [BUMP_LENGTH, BUMP_LENGTH])
+    if scenario.unevenness > 0.0:
+        _fill(fields, HEIGHT, streams[12:], ds, [HEIGHT_LENGTH, HEIGHT_LENGTH])
+        fields[:, HEIGHT : HEIGHT + 2] *= unevenness_rms(np.asarray(scenario.unevenness), length=HEIGHT_LENGTH)
     if scenario.grade:
         fields[:, GRADE] = np.interp(s, [p[0] for p in scenario.grade], [p[1] for p in scenario.grade])
     for kick in scenario.kicks:
@@ -130,6 +136,15 @@ def at_position(field, column, position, ds):  # type: ignore[no-untyped-def]
         return field[last, column]
     j = int(x)
     return field[j, column] + (x - j) * (field[j + 1, column] - field[j, column])
+
+
+@compiled
+def rise_at(field, column, position, ds):  # type: ignore[no-untyped-def]
+    """Slope of a field over the position; 0 beyond its ends."""
+    x = position / ds
+    if not 0.0 <= x < field.shape[0] - 1:
+        return 0.0
+    return (field[int(x) + 1, column] - field[int(x), column]) / ds
 
 
 @compiled

@@ -139,5 +139,7 @@ class Scenario:
     drive_share: Profile = ()  # share of the driver's torque that reaches the wheels over time; empty: all of it
     antilock: bool = False  # brakes with an antilock system
     kicks: tuple[Kick, ...] = ()
+    unevenness: float = 0.0  # [m³] of the whole road, G_d(n_0) of [iso8608_2016]; 0: even
+    steering_friction: float = 0.0  # [N] dry friction of the rack
     water_scatter: float = 1.0  # scales the fluctuation of contact and track film; 0: even
     sensors: Sensors = field(default=ESC)

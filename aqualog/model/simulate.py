@@ -12,10 +12,10 @@ from aqualog.core.records import FloatArray
 from aqualog.model import kernel
 from aqualog.model.excitation import AMPLITUDE_KINDS, waveform
 from aqualog.model.plant import F_Z_HALF_LENGTH, P_HALF_LENGTH, Plant, build_plant, with_mass_at
-from aqualog.model.road import GRADE, build_road
+from aqualog.model.road import GRADE, HEIGHT, build_road
 from aqualog.model.scenario import Profile, Scenario
 from aqualog.model.sensors import Measured, Truth, measure
-from aqualog.model.state import COLUMNS, column, resistance_at, rolling_state, wheel_columns
+from aqualog.model.state import COLUMNS, LIFT, column, resistance_at, rolling_state, wheel_columns
 from aqualog.model.term import Model, Setup
 from aqualog.physics.contact import contact_half_length
 from aqualog.physics.load import G
@@ -133,6 +133,7 @@ def run_kernel(setup: Setup, *, dt: float, every: int) -> FloatArray:
     controls = _controls(scenario, n, dt)
     road = build_road(scenario, float(np.max(controls.v_target)) * 1.3 * scenario.duration_s + 50.0)
     start = _start(plant, controls, float(road.fields[0, GRADE]))
+    start[LIFT : LIFT + 4] = np.tile(road.fields[0, HEIGHT : HEIGHT + 2], 2)
     rows = kernel.run(n, dt, every, start, plant, road, controls, _vectored(scenario, n, dt))
     if not np.isfinite(rows).all():
         raise ConfigError("the simulation diverged", hint="less extreme parameters of car, tyre, lane or model")
@@ -193,6 +194,8 @@ def _controls(scenario: Scenario, n: int, dt: float) -> kernel.Controls:
         scatter=float(scenario.water_scatter),
         antilock=scenario.antilock,
         kicks=bool(scenario.kicks),
+        is_uneven=scenario.unevenness > 0.0,
+        steering_friction=scenario.steering_friction,
     )
 
 
@@ -214,8 +217,10 @@ def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) 
         columns[f"omega_{w}"] = wheels["omega"][i]
         columns[f"angle_{w}"] = wheels["angle"][i]
         columns[f"torque_{w}"] = wheels["torque"][i] / plant.torque_gain
-    rod_wheels = {n: wheel_columns(rows, n) for n in ("aligning", "braking", "wave_drag")}
+    rod_wheels = {n: wheel_columns(rows, n) for n in ("aligning", "braking", "wave_drag", "climb")}
     columns |= steering_columns(wheels | rod_wheels, plant, scenario)
+    # the friction of the rack lies between the rods and the torque that holds it
+    columns["steering_torque"] -= STEERING.ratio * STEERING.stiffness * STEERING.arm * column(rows, "held")
     if scenario.lanes:
         columns |= _labels(scenario, column(rows, "lane_front").astype(int), column(rows, "lane_rear").astype(int))
     v_w = np.array(wheels["omega"]) * np.array(wheel_columns(rows, "r_e"))
@@ -235,7 +240,8 @@ def steering_columns(wheels: dict[str, list[FloatArray]], plant: Plant, scenario
     given = scenario.vehicle.tie_rod
     rods = []
     for i, outward in enumerate((1.0, -1.0)):
-        F_x, F_y = wheels["F_x"][i] - wheels["wave_drag"][i], outward * wheels["F_y"][i]
+        F_x = wheels["F_x"][i] - wheels["wave_drag"][i] - wheels["climb"][i]
+        F_y = outward * wheels["F_y"][i]
         aligning, braking = outward * wheels["aligning"][i], wheels["braking"][i]
         if given:
             c0, c_y, c_x = (given.get(n, (0.0,)) for n in ("c0", "c_y", "c_x"))

@@ -19,19 +19,22 @@ __all__ = [
 
 # states: speeds and attitude, low-passed specific forces, the driver; then four of each wheel
 V_X, V_Y, YAW_RATE, PSI, S, Y_LAT, A_X, A_Y, INTEGRAL, DRIVE, BRAKE, STEER = range(12)
-OMEGA, ANGLE, SLIP_X, SLIP_Y = 12, 16, 20, 24
-N_STATES = 28
-# the Jacobian: a diagonal, and behind it the coupling of v_x with the wheels, d(v_x')/d(omega) and d(omega')/d(v_x)
-J_V, J_W = N_STATES, N_STATES + 4
-N_JACOBIAN = N_STATES + 8
+# where rim and belt are two, the speed of the belt and their twist; of a wheel that hops its lift and the lift's rate
+OMEGA, BELT, ANGLE, SLIP_X, SLIP_Y, TWIST, LIFT, RISE = range(12, 44, 4)
+N_STATES = 44
+# the Jacobian: a diagonal, and behind it the coupling of v_x with the wheels and then the belts, d(v_x')/d(omega) and
+# d(omega')/d(v_x)
+J_V, J_W = N_STATES, N_STATES + 8
+N_JACOBIAN = N_STATES + 16
 
 _SCALARS = (
     "v_x", "v_y", "yaw_rate", "psi", "position", "y_lat", "a_x", "a_y", "steer_angle", "drive_torque", "brake_torque",
-    "grade", "lane_front", "lane_rear", "drag", "nudge",
+    "grade", "lane_front", "lane_rear", "drag", "nudge", "held",
 )  # fmt: skip
 _WHEELS = (
     "omega", "angle", "torque", "F_x", "F_y", "F_z", "s_x", "slip_angle", "contact", "slope", "mu_max", "film",
-    "water_torque", "wave_drag", "resisting_torque", "v_along", "r_e", "v_full", "aligning", "braking",
+    "water_torque", "wave_drag", "resisting_torque", "v_along", "r_e", "v_full", "aligning", "braking", "climb",
+    "tread_omega", "twist",
 )  # fmt: skip
 COLUMNS = {name: i for i, name in enumerate(_SCALARS)} | {name: len(_SCALARS) + 4 * i for i, name in enumerate(_WHEELS)}
 WIDTH = len(_SCALARS) + 4 * len(_WHEELS)
@@ -79,5 +82,7 @@ def rolling_state(plant: Plant, *, v: float, a: float, drive: float, split_rear:
     slip = np.clip(force / np.maximum(plant.slip_slope * _loads(plant, a), 1.0), -0.1, 0.1)
     r_e = np.array([float(effective_radius(np.array([r]), np.array([v]), growth=g)[0]) for r, g in radii])
     y[OMEGA : OMEGA + 4] = v / (r_e * (1.0 - slip))
+    y[BELT : BELT + 4] = y[OMEGA : OMEGA + 4]
+    y[TWIST : TWIST + 4] = (share * drive - plant.brake_drag) / np.maximum(plant.torsion_stiffness, 1.0)
     y[SLIP_X : SLIP_X + 4] = slip
     return y

@@ -89,6 +89,15 @@ class Tyre:
         "m", 0.4, 0.1, 50.0, "its correlation length", "v / (2 pi f) of a wheel hop of 10-12 Hz at 100 km/h (D)"
     )  # fmt: skip
 
+    torsion_frequency: float = _of(
+        "Hz", 0.0, 0.0, 60.0, "at which the rim swings on a belt that the road holds; 0: it does not",
+        "30-45 (K); wheel speeds show such a mode (V, [persson2002])",
+    )  # fmt: skip
+    torsion_damping: float = _of("-", 0.06, 0.0, 0.3, "damping of that swing over the critical one", "0.05-0.1 (K)")
+    belt_share: float = _of(
+        "-", 0.55, 0.1, 0.9, "belt's share of the wheel's inertia; without the swing all turns as one", "(K)"
+    )  # fmt: skip
+
     @property
     def tread_capacity(self) -> float:
         """Water that the grooves can take, as a depth. [m]"""

@@ -18,6 +18,7 @@ from aqualog.model.road import (
     CONTACT_WHEEL,
     DEPTH,
     DEPTH_LEFT,
+    HEIGHT,
     IRREGULARITY_LEFT,
     KICK_LOAD,
     KICK_TORQUE,
@@ -28,14 +29,16 @@ from aqualog.model.road import (
     SURFACE_WIDTH,
     TRACK,
     at_position,
+    rise_at,
 )
-from aqualog.model.state import ANGLE, AT, J_V, J_W, OMEGA, SLIP_X, SLIP_Y, V_X, V_Y, YAW_RATE
-from aqualog.physics import contact, hydroplaning, kinematics, rolling, slip, steering, surface, tyre_brush, water
+from aqualog.model.state import ANGLE, AT, BELT, J_V, J_W, LIFT, OMEGA, RISE, SLIP_X, SLIP_Y, TWIST, V_X, V_Y, YAW_RATE
+from aqualog.physics import contact, hydroplaning, kinematics, load, rolling, slip, steering, surface, tyre_brush, water
 from aqualog.physics.hydroplaning import WaterLaw
 from aqualog.physics.resistance import rolling_resistance_force
 
 __all__ = [
-    "Body", "Command", "Contact", "Ground", "Now", "Place", "even_full_speed", "ground_under", "water_at", "wheel",
+    "Body", "Command", "Contact", "Ground", "Now", "Place", "even_full_speed", "ground_under", "over_road", "water_at",
+    "wheel",
 ]  # fmt: skip
 
 _wheel_velocity = inlined(kinematics.wheel_velocity)
@@ -55,6 +58,9 @@ _rolling_force = inlined(rolling_resistance_force)
 _aligning_moment = inlined(steering.aligning_moment)
 _effective_radius = inlined(rolling.effective_radius)
 _load_factor = inlined(rolling.load_factor)
+_carcass_torque = inlined(rolling.carcass_torque)
+_hop = inlined(load.hop)
+_HOP_MASS, _HOP_STIFFNESS, _HOP_DAMPING = load.HOP
 _SPIN_UP_RATIO = float(hydroplaning.SPIN_UP_RATIO)
 _FIELD_SHARE = float(np.sqrt(0.5))  # half of the contact's variance is the road's, half the wheel's own
 
@@ -95,7 +101,7 @@ class Body(NamedTuple):
 
 
 class _Rolling(NamedTuple):
-    """Lever arms from the centre of mass, speeds over ground along and across, radii, rim speed. [m, m/s]"""
+    """Lever arms from the centre of mass, speeds of the tread and over ground, radius, speed at it. [m, rad/s, m/s]"""
 
     x: float
     y: float
@@ -109,10 +115,12 @@ class _Rolling(NamedTuple):
 class Ground(NamedTuple):
     """Load [N], friction, yield and rolling resistance coefficient [-], torque of bumps [N·m], film [m].
 
-    `noise` is the fluctuation of the contact where there is a film, of unit variance.
+    `noise` is the fluctuation of the contact where there is a film, of unit variance; `climb` [N] what the slope of the
+    road's unevenness holds the wheel's centre back with.
     """
 
     F_z: float
+    climb: float
     mu: float
     compliance: float
     r_w: float
@@ -150,7 +158,7 @@ class _Slip(NamedTuple):
 
 
 class _Balance(NamedTuple):
-    """Torques [N·m]; `turn` is the sign of the turning, smooth within `standstill` [rad/s]."""
+    """Torques [N·m]; `turn`, `rim_turn`: signs of the tread's and the rim's turning, smooth within `standstill`."""
 
     torque: float
     braking: float
@@ -158,11 +166,29 @@ class _Balance(NamedTuple):
     resisting: float
     standstill: float
     turn: float
+    rim_turn: float
 
 
 @part
-def ground_under(i, warm, F_z, place, p, q, lanes, fields, track):  # type: ignore[no-untyped-def]
-    """Return the road under wheel `i`; the film of a rear wheel is what the front one has left."""
+def over_road(i, F_z, way, m, p, fields):  # type: ignore[no-untyped-def]
+    """Let wheel `i` hop over the unevenness at a way [m]; return its load and what the slope there takes. [N]"""
+    side = i % 2
+    height = at_position(fields, HEIGHT + side, way, p.ds)
+    rate = m.y[RISE + i]
+    added, rising = _hop(m.y[LIFT + i], rate, height, _HOP_MASS, _HOP_STIFFNESS, _HOP_DAMPING)
+    m.f[LIFT + i] = rate
+    m.f[RISE + i] = rising
+    F_z = max(F_z + added, 0.0)
+    return F_z, F_z * rise_at(fields, HEIGHT + side, way, p.ds)
+
+
+@part
+def ground_under(i, warm, weight, place, p, q, lanes, fields, track):  # type: ignore[no-untyped-def]
+    """Return the road under wheel `i`; the film of a rear wheel is what the front one has left.
+
+    `weight`: what `over_road` returns, or the static load and 0 on an even road.
+    """
+    F_z, climb = weight
     lane, side = place.lane, i % 2
     mu = q.mu
     compliance = 0.0
@@ -191,7 +217,7 @@ def ground_under(i, warm, F_z, place, p, q, lanes, fields, track):  # type: igno
             at_position(fields, CONTACT_ROAD + side, place.way, p.ds)
             + at_position(fields, CONTACT_WHEEL + i, place.way, p.ds)
         )
-    return Ground(F_z, mu, compliance, r_w, bump, film, noise)
+    return Ground(F_z, climb, mu, compliance, r_w, bump, film, noise)
 
 
 @part
@@ -203,14 +229,19 @@ def wheel(i, now, ground, command, m, p, q):  # type: ignore[no-untyped-def]
     slips = _slip(i, m, roll, q.relaxation_length)
     F_x, F_y = _brush_forces(slips.s_x, slips.s_y, ground.F_z, wet.mu, stiff.C_x, stiff.C_y, wet.contact)
     balance = _balance(i, roll, ground, wet, command, m, p, q)
-    m.f[OMEGA + i] = (
-        balance.torque - F_x * roll.r_e - (balance.resisting + balance.braking) * balance.turn + ground.bump
-    ) / q.inertia
-    m.f[ANGLE + i] = roll.omega
-    _jacobian(i, m, F_x, roll, slips, stiff, wet.contact, balance, p, q.inertia)
+    if q.belt_inertia > 0.0:
+        _twist(i, m, F_x, roll, ground, balance, q)
+    else:
+        m.f[OMEGA + i] = (
+            balance.torque - F_x * roll.r_e - (balance.resisting + balance.braking) * balance.turn + ground.bump
+        ) / q.inertia
+    m.f[ANGLE + i] = m.y[OMEGA + i]
+    _jacobian(i, m, F_x, roll, slips, stiff, wet.contact, balance, p, q)
     if m.is_recorded > 0.0:
         out = m.out
         _record(i, out, roll, ground, wet, balance, stiff.slope)
+        out[AT.omega + i] = m.y[OMEGA + i]
+        out[AT.twist + i] = m.y[TWIST + i]
         out[AT.angle + i] = m.y[ANGLE + i]
         out[AT.F_x + i] = F_x
         out[AT.F_y + i] = F_y
@@ -221,7 +252,7 @@ def wheel(i, now, ground, command, m, p, q):  # type: ignore[no-untyped-def]
             out[AT.aligning + i] = _aligning_moment(
                 slips.s_x, slips.s_y, ground.F_z, wet.mu, stiff.C_x, stiff.C_y, wet.contact, half
             )
-    return _on_body(i, now, roll, F_x - wet.wave, F_y)
+    return _on_body(i, now, roll, F_x - wet.wave - ground.climb, F_y)
 
 
 @part
@@ -232,7 +263,7 @@ def _rolling(i, now, m, p, q):  # type: ignore[no-untyped-def]
     angle = now.steer if front else 0.0
     along, across = _wheel_velocity(m.y[V_X], m.y[V_Y], m.y[YAW_RATE], angle, x, side)
     r_e = _effective_radius(q.r_e, along, q.radius_growth) * (1.0 - q.leak_radius * now.leak)
-    omega = m.y[OMEGA + i]
+    omega = m.y[BELT + i] if q.belt_inertia > 0.0 else m.y[OMEGA + i]
     return _Rolling(x, side, omega, along, across, r_e, omega * r_e)
 
 
@@ -318,24 +349,40 @@ def _balance(i, roll, ground, wet, command, m, p, q):  # type: ignore[no-untyped
     # resistance fades out near standstill instead of jumping, over what one step of it can change
     standstill = max(1.0, p.dt * (resisting + braking) / q.inertia)
     turn = min(max(roll.omega / standstill, -1.0), 1.0)
-    return _Balance(torque, braking, water_torque, resisting, standstill, turn)
+    rim_turn = min(max(m.y[OMEGA + i] / standstill, -1.0), 1.0)
+    return _Balance(torque, braking, water_torque, resisting, standstill, turn, rim_turn)
 
 
 @part
-def _jacobian(i, m, F_x, roll, slips, stiff, L, balance, p, inertia):  # type: ignore[no-untyped-def]
+def _twist(i, m, F_x, roll, ground, balance, q):  # type: ignore[no-untyped-def]
+    """Fill the derivatives of a rim, on which drive and brake act, and of its belt, on which the road acts."""
+    y, f = m.y, m.f
+    rate = y[OMEGA + i] - roll.omega
+    carcass = _carcass_torque(y[TWIST + i], rate, q.torsion_stiffness, q.torsion_damping)
+    at_rim = balance.braking + q.brake_drag
+    f[OMEGA + i] = (balance.torque - at_rim * balance.rim_turn - carcass) / q.inertia
+    at_belt = (balance.resisting - q.brake_drag) * balance.turn
+    f[BELT + i] = (carcass - F_x * roll.r_e - at_belt + ground.bump) / q.belt_inertia
+    f[TWIST + i] = rate
+
+
+@part
+def _jacobian(i, m, F_x, roll, slips, stiff, L, balance, p, q):  # type: ignore[no-untyped-def]
     # the secant, not the tangent: a sliding tyre must be damped too where one step would carry it past sticking
     dF_dsx = abs(F_x) / abs(slips.s_x) if abs(slips.s_x) > 1e-9 else stiff.C_x * _stiffness_ratio(L)
     jac = m.jac
-    arm = roll.r_e / inertia
-    jac[OMEGA + i] = -dF_dsx * slips.by_omega * arm
-    jac[J_W + i] = -dF_dsx * slips.by_v * arm
-    jac[J_V + i] = dF_dsx * slips.by_omega / p.mass
+    # where rim and belt are two, the tread is the belt's; their own coupling is not stiff
+    tread, turned = (i + 4, q.belt_inertia) if q.belt_inertia > 0.0 else (i, q.inertia)
+    arm = roll.r_e / turned
+    jac[OMEGA + tread] = -dF_dsx * slips.by_omega * arm
+    jac[J_W + tread] = -dF_dsx * slips.by_v * arm
+    jac[J_V + tread] = dF_dsx * slips.by_omega / p.mass
     jac[V_X] += dF_dsx * slips.by_v / p.mass
     across = stiff.C_y * slips.by_v * (dF_dsx / max(stiff.C_x, 1.0))
     jac[V_Y] += across / p.mass
     jac[YAW_RATE] += across * roll.x * roll.x / p.I_zz
     if abs(roll.omega) < balance.standstill:
-        jac[OMEGA + i] -= (balance.resisting + balance.braking) / (inertia * balance.standstill)
+        jac[OMEGA + tread] -= (balance.resisting + balance.braking) / (turned * balance.standstill)
 
 
 @part
@@ -348,8 +395,9 @@ def _on_body(i, now, roll, along, F_y):  # type: ignore[no-untyped-def]
 
 @part
 def _record(i, out, roll, ground, wet, balance, slope):  # type: ignore[no-untyped-def]
-    out[AT.omega + i] = roll.omega
-    out[AT.torque + i] = balance.torque - balance.braking * balance.turn
+    out[AT.tread_omega + i] = roll.omega
+    out[AT.climb + i] = ground.climb
+    out[AT.torque + i] = balance.torque - balance.braking * balance.rim_turn
     out[AT.F_z + i] = ground.F_z
     out[AT.slip_angle + i] = -np.arctan2(roll.across, max(abs(roll.along), 0.5))
     out[AT.contact + i] = wet.contact
@@ -361,4 +409,4 @@ def _record(i, out, roll, ground, wet, balance, slope):  # type: ignore[no-untyp
     out[AT.resisting_torque + i] = balance.resisting * balance.turn
     out[AT.v_along + i] = roll.along
     out[AT.r_e + i] = roll.r_e
-    out[AT.braking + i] = balance.braking * balance.turn
+    out[AT.braking + i] = balance.braking * balance.rim_turn

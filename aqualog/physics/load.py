@@ -2,13 +2,61 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from aqualog.core.records import FloatArray
 
-__all__ = ["G", "centre_shift", "loads_of_wheels", "wheel_loads"]
+__all__ = ["HOP", "G", "Hop", "centre_shift", "hop", "loads_of_wheels", "unevenness_rms", "wheel_loads"]
 
 G = 9.80665  # [m/s^2]
+_N_0 = 0.1  # [1/m] spatial frequency at which [iso8608_2016] states unevenness
+
+
+class Hop(NamedTuple):
+    """A wheel with its hub between road and body: it hops at 11 Hz with a quarter of critical damping (K).
+
+    Mass [kg], vertical stiffness of the tyre [N/m], damper to the body [N·s/m].
+    """
+
+    mass: float = 40.0
+    stiffness: float = 2.0e5
+    damping: float = 1500.0
+
+
+HOP = Hop()
+
+
+def unevenness_rms(unevenness: FloatArray, *, length: float) -> FloatArray:
+    """Rms of a height whose waves much shorter than 2 pi `length` [m] are a road's by ISO 8608 [iso8608_2016]. [m]
+
+    `unevenness` is G_d(n_0) at n_0 = 0.1 1/m: 16e-6 a very good road (class A), 256e-6 an average one (class C). [m³]
+    Limits: the one-sided density of an exponential correlation, 4 rms² length / (1 + (2 pi n length)²), falls as
+    G_d (n_0 / n)² where n is large.
+
+    Source: classes and the square law from memory (K); the relation derived.
+    """
+    rms: FloatArray = np.pi * _N_0 * np.sqrt(unevenness * length)
+    return rms
+
+
+def hop(
+    lift: FloatArray, rate: FloatArray, height: FloatArray, *, mass: float, stiffness: float, damping: float
+) -> tuple[FloatArray, FloatArray]:
+    """Load that a hopping wheel adds to the static one [N], and the wheel's acceleration upward. [m/s²]
+
+    `lift` and `rate`: height of the wheel above its place on an even road, and its rate; `height` of the road under it,
+    all upward positive. [m], [m/s] The others are those of `Hop`. The body stays where it is: it follows slow waves
+    only, which `unevenness_rms` leaves out.
+
+    Limits: a wheel that follows the road adds no load. On a road of `unevenness` G_d the damper takes
+    pi² n_0² G_d stiffness from the motion, as a force on each wheel, at any speed, mass and damping.
+
+    Source: [zuo2011] for that power (formula K, its dependences read in the abstract); derived.
+    """
+    load = stiffness * (height - lift)
+    return load, (load - damping * rate) / mass
 
 
 def loads_of_wheels(

@@ -6,7 +6,10 @@ import numpy as np
 
 from aqualog.core.records import FloatArray
 
-__all__ = ["effective_radius", "load_factor", "mf61_rolling_resistance", "pressure_factor", "warm_up_factor"]
+__all__ = [
+    "carcass_torque", "effective_radius", "load_factor", "mf61_rolling_resistance", "pressure_factor",
+    "warm_up_factor",
+]  # fmt: skip
 
 
 def effective_radius(r_e: FloatArray, v: FloatArray, *, growth: float) -> FloatArray:
@@ -69,6 +72,20 @@ def warm_up_factor(t: FloatArray, *, extra: float, time_constant: float) -> Floa
     Source: UN Regulation 117 [unece_r117_2011] for 8 % per 10 K; the shape is general knowledge (K).
     """
     return 1.0 + extra * np.exp(-t / time_constant)
+
+
+def carcass_torque(twist: FloatArray, rate: FloatArray, *, stiffness: float, damping: float) -> FloatArray:
+    """Torque that the rim hands to the belt through the side walls, forward positive. [N·m]
+
+    `twist` and `rate`: angle of the rim ahead of the belt, and its rate [rad], [rad/s]; stiffness [N·m/rad] and damping
+    [N·m·s/rad] of the side walls.
+
+    Limits: a rim on a belt that the road holds swings at sqrt(stiffness / inertia of the rim); free of the road, faster
+    by sqrt(1 + rim / belt). Slow changes of torque see a relaxation length of C_x r_e² / stiffness.
+
+    Source: the rigid ring of [pacejka2012] (K), in rotation alone.
+    """
+    return stiffness * twist + damping * rate
 
 
 def load_factor(F_z: FloatArray, *, F_z_ref: float, sensitivity: float) -> FloatArray:

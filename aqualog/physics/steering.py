@@ -10,7 +10,10 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.physics.tyre_brush import brush_parts, sliding_edge
 
-__all__ = ["STEERING", "SteeringGeometry", "aligning_moment", "kingpin_moment", "steering_torque", "tie_rod_force"]
+__all__ = [
+    "STEERING", "SteeringGeometry", "aligning_moment", "held_angle", "kingpin_moment", "steering_torque",
+    "tie_rod_force",
+]  # fmt: skip
 
 
 class SteeringGeometry(NamedTuple):
@@ -26,6 +29,7 @@ class SteeringGeometry(NamedTuple):
     inclination: float = 0.218  # kingpin leans inward
     caster: float = 0.10  # kingpin leans back
     ratio: float = 8.0e-3  # pinion's pitch radius: torque at the steering over the rack's force
+    stiffness: float = 1.8e6  # [N/m] of the column at the rack: 2 N·m per degree of the pinion
 
 
 STEERING = SteeringGeometry()
@@ -142,6 +146,27 @@ def steering_torque(rod_left: FloatArray, rod_right: FloatArray, *, ratio: float
     Source: derived.
     """
     return ratio * (rod_right - rod_left)
+
+
+def held_angle(rack: FloatArray, free: FloatArray, *, friction: float, per_force: float) -> FloatArray:
+    """Angle by which dry friction holds the front wheels away from where they would turn without it. [rad]
+
+    Parameters
+    ----------
+    rack, free : array
+        Road-wheel angles, left positive: at which the rack stood a moment ago, and without friction, from the steering
+        wheel and what the rods' force bends the column. [rad]
+    friction, per_force : float
+        Dry friction of the rack, 100 to 200 N on a car (K); angle over the rack's force. >= 0 [N], [rad/N]
+
+    Limits: at friction times `per_force` the rack slides, below it stands. The friction's force on it is the angle over
+    `per_force`. Without friction 0. Around any closed course of `free` it takes energy or, where the rack stands, none.
+
+    Source: an elastic column in series with Coulomb friction, derived; [knapczyk2004] fits such a model to a rig.
+    """
+    most = friction * per_force
+    held: FloatArray = np.minimum(np.maximum(rack - free, -most), most)
+    return held
 
 
 def tie_rod_force(

@@ -63,9 +63,6 @@ def assert_same(a: Signals, b: Signals):
     assert list(a.origins) == list(b.origins)
 
 
-# --- the same ---------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("path", LOGS, ids=lambda p: p.suffix[1:])
 def test_signals_are_the_same_to_the_bit(path, place, not_read):
     given = {"vehicle": CAR, "signal_map": load_signal_map(MAPS[path.suffix]) if path.suffix in MAPS else None}
@@ -100,9 +97,6 @@ def test_nulls_faults_and_notes_survive():
     again = from_parquet(to_parquet(signals).getvalue())
     assert_same(signals, again)
     assert str(again.frame["a_x"][1]) == "-0.0"
-
-
-# --- what a drive is known by -----------------------------------------------------------------------------------------
 
 
 def test_key_holds_all_that_signals_depend_on(log, place, monkeypatch):
@@ -180,9 +174,6 @@ def test_what_is_not_kept(log, place, monkeypatch):
     monkeypatch.setattr(*READ, lambda *_, **__: (log.write_bytes(b"x"), real)[1])
     load_signals([log], vehicle=CAR, cache=place)
     assert place.kept() == []
-
-
-# --- a folder in any state --------------------------------------------------------------------------------------------
 
 
 def flip(path):
@@ -283,9 +274,6 @@ def test_many_processes_at_once(log, tmp_path):
     assert [e for _, e in outs] == [""] * 3
     assert [len(set(o.split("\n"))) for o, _ in outs] == [2, 2, 2]  # one line, and what is behind the last
     assert not list((tmp_path / "cache" / "signals").glob(".*"))
-
-
-# --- the command ------------------------------------------------------------------------------------------------------
 
 
 def test_nothing_is_kept_unless_asked_for(log, tmp_path):

@@ -67,9 +67,6 @@ def holds(interval, truth):
     return interval[0] <= truth <= interval[1]
 
 
-# --------------------------------------------------------------------------------------------------- known truth
-
-
 def test_late_source_has_positive_offset():
     t = np.arange(0, 60_000_000_000, 20_000_000)
     s = t * 1e-9
@@ -149,9 +146,6 @@ def test_yaw_rate_has_no_slip():
     assert math.isnan(fit.slip_offset_s)
 
 
-# ---------------------------------------------------------------------------------------------------- bad data
-
-
 def test_nan_gaps_spikes_and_duplicates():
     t_ref, v_ref, t, v = pair(6, 600.0, rate=50.0, offset=0.6)
     rng = np.random.default_rng(0)
@@ -196,9 +190,6 @@ def test_clocks_hours_apart():
     assert fit.offset_s == pytest.approx(-1.7e9 + 0.2, abs=0.02)
     assert holds(fit.slip_offset_ci95, -1.7e9 + 0.2)
     assert abs(fit.mid_ns - int(t.mean())) < 2e9
-
-
-# ----------------------------------------------------------------------------------------------------- refusals
 
 
 def refused(*arrays, match, **options):
@@ -255,9 +246,6 @@ def test_bad_arguments_and_opposite_signs():
     refused(*ref, t, v, match="least overlap", min_overlap_s=5.0)
 
 
-# ---------------------------------------------------------------------------------------------------- statistics
-
-
 @pytest.mark.parametrize(
     ("seconds", "sd", "memory_s"), [(60.0, 0.1, 2.0), pytest.param(150.0, 0.3, 5.0, marks=pytest.mark.nightly)]
 )
@@ -310,9 +298,6 @@ def test_speed():
     began = time.perf_counter()
     estimate_clock(*data)
     assert time.perf_counter() - began < 3.0
-
-
-# ------------------------------------------------------------------------------------------------ measured drives
 
 
 def nanoseconds(seconds):

@@ -60,9 +60,6 @@ def told(work, found, **more):
     return foretell(work, found, **({"processes": 2, "cores": 2, "lead_s": 1.0, "lead_cpu_s": 0.5} | more))
 
 
-# --- the sample -------------------------------------------------------------------------------------------------------
-
-
 def test_a_sample_has_every_format_and_both_ends_of_the_sizes():
     new = [*jobs(50), *jobs(5, "mdf", step=1000), *jobs(1, "mcap"), *jobs(3, "unknown")]
     chosen = choose(new, 8)
@@ -75,9 +72,6 @@ def test_a_sample_has_every_format_and_both_ends_of_the_sizes():
     assert sizes["unknown"] == []
     assert sorted(s for _, _, s in choose(jobs(3), 8)) == [1_000_000, 2_000_000, 3_000_000]
     assert choose(jobs(3, "unknown"), 8) == []
-
-
-# --- the sum ----------------------------------------------------------------------------------------------------------
 
 
 def test_costs_on_a_line_are_foretold_exactly():
@@ -143,9 +137,6 @@ def test_shards_are_those_that_the_batch_makes(campaign):
     assert shards_within(configured, Work(tuple(new), 0, 0, ()), plan, 6.0) is None
 
 
-# --- what is there already ----------------------------------------------------------------------------------------------
-
-
 def test_what_is_in_the_store_is_not_counted_and_nothing_is_hashed(tmp_path, monkeypatch):
     path = make_campaign(tmp_path, speeds=(70, 80), repeats=1)
     configured, store = configure(path), Store(tmp_path / "store")
@@ -156,9 +147,6 @@ def test_what_is_in_the_store_is_not_counted_and_nothing_is_hashed(tmp_path, mon
     work = work_of(configure(path), store)
     assert [j.logs for j, _, _ in work.new] == [runs[1].logs]
     assert (work.kept, work.failed, len(work.missing)) == (1, 0, 1)
-
-
-# --- the command --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.nightly
@@ -206,9 +194,6 @@ def test_errors(tmp_path, campaign):
     result = run("plan", path)
     assert result.exit_code == 4
     assert "none of 2 logs of the sample" in result.stderr
-
-
-# --- compiling --------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -76,9 +76,6 @@ def spoil(monkeypatch, name, act):
     monkeypatch.setattr(batch, "load_drive", reads)
 
 
-# --- what is kept, and for which content ------------------------------------------------------------------------------
-
-
 def test_a_log_that_changes_meanwhile_is_kept_under_no_key(bare, monkeypatch):
     log = bare / "logs" / "v090_0.parquet"
     good, other = log.read_bytes(), (bare / "logs" / "v100_0.parquet").read_bytes()
@@ -169,9 +166,6 @@ def test_every_source_behind_a_result_is_in_its_key(made):
     assert code_stamp()
 
 
-# --- the disk ---------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_full_disk_is_the_stores_fault_and_ends_the_batch(bare, jobs):
     """A limit on the size of files stands for it: the results do not fit, the marks do."""
@@ -234,9 +228,6 @@ def test_a_read_only_store_serves_while_nothing_is_new(own, monkeypatch):
         with pytest.raises(AqualogError, match=r"cannot be written \(Read-only"):
             batched(own, force=True)
     assert {p: p.stat().st_mtime_ns for p in (own / "campaign.store").rglob("*")} == before
-
-
-# --- damage -----------------------------------------------------------------------------------------------------------
 
 
 def metadata(path, about):
@@ -348,9 +339,6 @@ def test_files_of_others_are_not_swept(own):
     assert mine.exists()
 
 
-# --- logs that are none -----------------------------------------------------------------------------------------------
-
-
 def test_devices_pipes_and_loops_are_a_fault_of_that_log_only(bare):
     logs = bare / "logs"
     os.mkfifo(logs / "pipe.mf4")
@@ -384,9 +372,6 @@ def test_a_log_that_grows_while_it_is_hashed_has_an_end(tmp_path):
         patch.setattr(type(log), "stat", lambda p, **kw: state if p == log else real(p, **kw))
         assert Contents().of(log) == whole
     assert Contents().of(log) != whole
-
-
-# --- side by side -----------------------------------------------------------------------------------------------------
 
 
 def test_one_batch_at_a_time(own):
@@ -438,9 +423,6 @@ def test_an_interrupt_while_processes_start_is_one_line(tmp_path, delay_s):
     assert "Traceback" not in error
     assert "interrupted" in error
     assert run_batch(configure(campaign), store_in(tmp_path)).done == 12
-
-
-# --- the command line -------------------------------------------------------------------------------------------------
 
 
 def test_no_result_goes_into_a_store(own):

@@ -109,6 +109,8 @@ grade_percent = 100.0
 brake_profile = [[1, 0], [2, 500]]
 torque_profile = [[0, -20]]
 water_scatter = 0.0
+unevenness_cm3 = 64.0
+steering_friction_n = 150.0
 sensors = "ideal"
 seed = 42
 """.replace("grade_percent = 100.0", "grade_profile = [[0, 0.0], [50.0, 10.0]]")
@@ -120,7 +122,7 @@ seed = 42
     assert found.grade == ((0.0, 0.0), (50.0, pytest.approx(math.atan(0.1))))
     assert found.brake_torque == ((1.0, 0.0), (2.0, 500.0))
     assert found.extra_torque == ((0.0, -20.0),)
-    assert found.water_scatter == 0.0
+    assert (found.water_scatter, found.unevenness, found.steering_friction) == (0.0, pytest.approx(64e-6), 150.0)
     assert found.sensors is IDEAL
     assert found.seed == 42
     assert load(folder, SHORT).sensors is ESC

@@ -196,8 +196,6 @@ def test_another_resistance_does_not_move_the_car_along_its_road():
     np.testing.assert_allclose(felt(other), c["a_x"][INSIDE] - np.gradient(c["v_x"], t)[INSIDE], atol=0.05)
 
 
-# --- torque in, speed out ---------------------------------------------------------------------------------------------
-
 PLANT = build_plant(SEDAN, TYRES["worn_summer"], TYRES["worn_summer"])
 
 

@@ -29,9 +29,6 @@ def slip_of_force(F_x, F_z, mu, slope):
     return np.sign(F_x) * 3.0 * mu / slope * (1.0 - np.cbrt(1.0 - np.abs(F_x) / (mu * F_z)))
 
 
-# --- steady driving ---------------------------------------------------------------------------------------------------
-
-
 def test_constant_speed_by_hand():
     r = simulate_half_car(CAR, HalfCarRun(5.0, v0=30.0, nu=0.25))
     drag = 0.5 * 0.66 * 1.204 * 900.0
@@ -79,9 +76,6 @@ def test_one_driven_axle(nu, free, driven):
     assert differential == pytest.approx(getattr(r, f"s_{driven}"), abs=1e-5)
 
 
-# --- excitation -------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("waveform", ["triangle", "sine", "ramp"])
 @pytest.mark.parametrize("a_x", [0.0, 1.0])
 @pytest.mark.parametrize("car", [CAR, UNEVEN])
@@ -121,9 +115,6 @@ def test_relative_amplitude_keeps_axle_forces_positive(a_x):
     r = simulate_half_car(CAR, HalfCarRun(16.0, a_x=a_x, nu=0.3, excitation=exciting("triangle", 1.0, "relative")))
     assert min(r.F_x_f.min(), r.F_x_r.min()) > -1.0
     assert r.F_x_r.min() < 1.0
-
-
-# --- surfaces ---------------------------------------------------------------------------------------------------------
 
 
 def test_slope_30_to_10_makes_three_times_the_slip():
@@ -175,9 +166,6 @@ def test_a_run_that_asks_too_much_from_the_start():
     r = simulate_half_car(CAR._replace(mu=0.1), HalfCarRun(0.5, a_x=3.0, nu=0.0))
     assert r.s_f[0] == pytest.approx(3 * 0.1 / 30)
     assert r.mu_f == pytest.approx(0.1)
-
-
-# --- the equations of motion ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("car", [CAR, UNEVEN])
@@ -248,9 +236,6 @@ def test_power_balance(car, surface):
     assert w["slip"] > 0.001 * w["drive"]
     if car.r_l_f == car.r_e_f:
         assert w["radii"] == 0.0
-
-
-# --- integration ------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("v0", [30.0, 12.0])

@@ -121,23 +121,34 @@ def test_slip_slope_by_regression_is_the_parameter(car):
 
 def energy_terms(rows, p, dt):
     """Power of every sink and source at each step, and the energy stored."""
-    omega = np.array([col(rows, "omega", i) for i in range(4)])
-    F_x = np.array([col(rows, "F_x", i) for i in range(4)])
-    v = np.array([col(rows, "v_along", i) for i in range(4)])
-    torque = np.array([col(rows, "torque", i) for i in range(4)])
-    resisting = np.array([col(rows, "resisting_torque", i) for i in range(4)])
-    wave = np.array([col(rows, "wave_drag", i) for i in range(4)])
-    inertia = p.inertia[:, None]
-    F_y = np.array([col(rows, "F_y", i) for i in range(4)])
+    names = (
+        "omega",
+        "tread_omega",
+        "twist",
+        "F_x",
+        "F_y",
+        "v_along",
+        "torque",
+        "resisting_torque",
+        "wave_drag",
+        "climb",
+    )
+    columns = (np.array([col(rows, n, i) for i in range(4)]) for n in names)
+    omega, tread, twist, F_x, F_y, v, torque, resisting, wave, climb = columns
+    inertia, belt, stiff, damping = (
+        x[:, None] for x in (p.inertia, p.belt_inertia, p.torsion_stiffness, p.torsion_damping)
+    )
     across = -np.tan(np.array([col(rows, "slip_angle", i) for i in range(4)])) * v
     stored = 0.5 * p.mass * (col(rows, "v_x") ** 2 + col(rows, "v_y") ** 2) + 0.5 * (inertia * omega**2).sum(0)
+    stored += 0.5 * (belt * tread**2 + stiff * twist**2).sum(0)
     stored += 0.5 * p.I_zz * col(rows, "yaw_rate") ** 2
     stored += (
         p.mass * G * np.concatenate([[0.0], np.cumsum(np.sin(col(rows, "grade"))[1:] * np.diff(col(rows, "position")))])
     )
     into = (torque * omega).sum(0)
-    out = (resisting * omega).sum(0) + col(rows, "drag") * col(rows, "v_x") + (wave * v).sum(0)
-    sliding = (F_x * (p.r_e[:, None] * omega - v) - F_y * across).sum(0)
+    out = (resisting * tread).sum(0) + col(rows, "drag") * col(rows, "v_x") + ((wave + climb) * v).sum(0)
+    out += (damping * (omega - tread) ** 2).sum(0)
+    sliding = (F_x * (p.r_e[:, None] * tread - v) - F_y * across).sum(0)
     return stored, into, out, sliding
 
 
@@ -146,7 +157,9 @@ def imbalance(sc, dt):
     rows, p = raw(sc, dt)
     stored, into, out, sliding = energy_terms(rows, p, dt)
     missing = np.trapezoid(into - out - sliding, dx=dt) - (stored[-1] - stored[0])
-    friction = [col(rows, "F_x", i) * (p.r_e[i] * col(rows, "omega", i) - col(rows, "v_along", i)) for i in range(4)]
+    friction = [
+        col(rows, "F_x", i) * (p.r_e[i] * col(rows, "tread_omega", i) - col(rows, "v_along", i)) for i in range(4)
+    ]
     return abs(missing) / np.trapezoid(np.abs(into), dx=dt), np.min(friction)
 
 

@@ -47,9 +47,6 @@ def wave(t):
     return np.sin(7.3 * t) / 3.0
 
 
-# ---- perfect sensors
-
-
 @pytest.mark.parametrize("rate_hz", [1000.0, 500.0, 100.0, 50.0])
 def test_ideal_is_the_truth_bit_for_bit(rate_hz):
     # an awkward column: negative zero, and neighbours that would spoil a sum even at share 0
@@ -101,9 +98,6 @@ def test_between_grid_points_the_truth_is_linear():
     truth = drive(a_x=wave)
     t, x = seen(truth, IDEAL, 333.0)["a_x"]
     np.testing.assert_allclose(x, np.interp(t, truth.t, truth.columns["a_x"]), rtol=0.0, atol=1e-13)
-
-
-# ---- one figure at a time
 
 
 @pytest.mark.parametrize(
@@ -207,9 +201,6 @@ def test_signals_that_the_truth_lacks_are_left_out():
     assert [(g.name, set(g.columns)) for g in groups] == [("esc", {"yaw_rate"})]
 
 
-# ---- random numbers
-
-
 def everything(duration=5.0):
     columns = dict.fromkeys(SYMBOLS, wave)
     columns |= {f"omega_{w}": lambda t: 80.0 + wave(t) for w in WHEELS}
@@ -307,9 +298,6 @@ def test_the_torques_share_one_gain_error_but_not_their_noise():
     assert np.std(gains, axis=0) == pytest.approx(0.02, rel=0.3)
     assert np.ptp(gains, axis=1).max() < 5e-4  # noise and rounding alone
     assert np.abs(np.mean(noises, axis=0)).max() < 0.05
-
-
-# ---- wheel-speed pick-ups
 
 
 def test_clean_teeth_show_the_speed_of_a_steady_wheel_from_the_first_sample_on():

@@ -30,8 +30,6 @@ def one(x):
     return np.array([float(x)])
 
 
-# --- contact ----------------------------------------------------------------------------------------------------------
-
 L_ALL = np.linspace(0.0, 1.0, 101)
 
 
@@ -95,8 +93,6 @@ def test_load_shift_and_film_take_about_the_momentum_of_the_water():
     assert (of_momentum > 0.3).all()
     assert (of_momentum < 2.0).all()
 
-
-# --- brush ------------------------------------------------------------------------------------------------------------
 
 F_Z, C_S = 4000.0, 120e3
 MU = 0.9
@@ -237,9 +233,6 @@ def test_a_lifted_wheel_gives_no_combined_force():
 
 def test_stiffness_of_the_full_contact():
     assert tyre_brush.brush_stiffness(one(12e6), one(0.07))[0] == pytest.approx(2 * 12e6 * 0.0049)
-
-
-# --- speed of full aquaplaning ----------------------------------------------------------------------------------------
 
 
 def test_horne_figures():
@@ -387,8 +380,6 @@ def test_lifted_wheel_has_a_speed_all_the_same():
     assert np.isfinite(v_full(F_z=0.0)).all()
 
 
-# --- water ------------------------------------------------------------------------------------------------------------
-
 FILM = {"width": 0.2, "tread_capacity": 0.4 * MM, "h_film": 0.6 * MM, "relief": 0.7}
 
 
@@ -466,9 +457,6 @@ def test_residual_film():
     )
 
 
-# --- roads that yield -------------------------------------------------------------------------------------------------
-
-
 def test_series_slope():
     slope = np.array([10.0, 31.7, 60.0])
     assert surface.series_slope(slope, compliance=0.0).tobytes() == slope.tobytes()
@@ -476,9 +464,6 @@ def test_series_slope():
     assert 1 / surface.series_slope(slope, compliance=1 / 15) == pytest.approx(1 / slope + 1 / 15)
     # thesis 3.3: 30 on high friction, 10 on low
     assert surface.series_slope(one(30.0), compliance=1 / 15)[0] == pytest.approx(10.0)
-
-
-# --- rolling ----------------------------------------------------------------------------------------------------------
 
 
 def test_effective_radius_grows_by_a_quarter_per_cent():
@@ -529,9 +514,6 @@ def test_pressure_factor_figures():
     assert rolling.pressure_factor(one(1.9e5), p_ref=1.9e5, p_nominal=2.2e5)[0] == 1.0
     relative = rolling.pressure_factor(one(2.2e5), p_ref=1.9e5, p_nominal=2.2e5)[0]
     assert relative == pytest.approx(1 / rolling.pressure_factor(one(1.9e5), p_ref=2.2e5, p_nominal=2.2e5)[0])
-
-
-# --- steering, kinematics, slip, resistance ---------------------------------------------------------------------------
 
 
 def test_tie_rod_polynomial_by_hand():
@@ -608,8 +590,6 @@ def test_parts_of_the_wheel_loads():
     assert load.wheel_loads(*a, **kw).sum(axis=0) == pytest.approx(1600 * G)
 
 
-# --- compiled ---------------------------------------------------------------------------------------------------------
-
 MODULES = (contact, hydroplaning, kinematics, load, resistance, rolling, slip, surface, tyre_brush, water)
 RANGES = {
     "L": (0, 1), "L_front": (0, 1), "b": (-0.07, 0.07), "a": (0.05, 0.1), "v": (0, 50), "v_full": (20, 50),
@@ -620,6 +600,7 @@ RANGES = {
     "F_z_ref": (2e3, 6e3), "width": (0.1, 0.3), "exponent": (2, 6), "h_onset": (1e-4, 5e-4),
     "h_bulk": (1e-3, 3e-3), "texture_depth": (2e-4, 2e-3),
     "tread_depth": (1e-3, 8e-3), "growth": (0, 5e-6), "v_w": (-5, 50), "v_along": (0, 50), "c_px": (1e6, 1e7),
+    "unevenness": (1e-6, 1e-3), "friction": (0, 300), "per_force": (1e-6, 1e-5), "rack": (-0.01, 0.01), "free": (-0.01, 0.01),
     "l_f": (1, 2), "l_r": (1, 2), "h_cg": (0.3, 1), "track": (1.3, 1.8), "t": (0, 600),
 }  # fmt: skip
 NOT_FOR_SCALARS = {"wheel_loads", "nominal_acceleration", "kinematic_steer_angle", "slip_of_wheel_speed", "wheel_slip"}

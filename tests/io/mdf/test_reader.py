@@ -85,9 +85,6 @@ def digest(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-# --- measured channels ---
-
-
 @pytest.mark.parametrize("version", ["3.30", "4.10", "4.11"])
 @pytest.mark.parametrize("compression", [0, 1, 2])
 def test_versions_and_compressions(tmp_path: Path, version: str, compression: int):
@@ -214,9 +211,6 @@ def is_master(data: bytearray, at: int) -> bool:
     return data[at + 24 + links * 8] == 2
 
 
-# --- formulas ---
-
-
 def test_reading_loads_no_other_reader(tmp_path: Path):
     """Least of all one that hands the text of a formula to `eval`, as asammdf does by way of sympy."""
     paths = [save(tmp_path / f"{v}.mf4", [signal("x", T)], version=v) for v in ("4.10", "3.30")]
@@ -272,9 +266,6 @@ def test_a_tower_of_powers_costs_nothing():
     assert np.isinf(Formula("X + 1" + "0" * 400)(np.zeros(1)))[0]
 
 
-# --- time ---
-
-
 def test_start_time_to_the_nanosecond_and_one_raster_for_all_groups(tmp_path: Path):
     path = tmp_path / "log.part"
     group = {"x": ("m/s", "speed", T)}
@@ -302,9 +293,6 @@ def test_samples_without_a_time_stamp_are_counted(tmp_path: Path):
     assert 7.0 not in channels["a.x"].values
     assert len(channels["a.x"].t_ns) == 199
     assert faults.lost_samples == 1
-
-
-# --- damaged files ---
 
 
 def test_unfinalised_file_is_read_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -440,9 +428,6 @@ def test_archive_suffix_is_refused_and_the_file_survives(tmp_path: Path):
     assert path.exists()
 
 
-# --- raw CAN ---
-
-
 @pytest.fixture
 def dbc(tmp_path: Path) -> Path:
     path = tmp_path / "car.dbc"
@@ -525,9 +510,6 @@ def test_payload_behind_a_cut_has_no_length():
     data, stored = _variable(np.frombuffer(whole[:-2], dtype=np.uint8), np.array([0, 7, 13, 21]))
     assert data.tolist() == [[1, 2, 3, 0], [1, 2, 0, 0], [1, 2, 0, 0], [0, 0, 0, 0]]
     assert stored.tolist() == [3, 2, 2, 0]
-
-
-# --- measured drives ---
 
 
 @pytest.mark.real

@@ -55,9 +55,6 @@ def find(data, mark, which=0):
     return found[which]
 
 
-# --- unfinished ---
-
-
 @pytest.mark.parametrize("flags", [1, 4, 1 | 4, 1 | 4 | 32])
 @pytest.mark.parametrize("make", [streamed, unsorted])
 def test_an_unfinished_file_is_read_without_a_copy_of_it(tmp_path, monkeypatch, make, flags):
@@ -146,9 +143,6 @@ def test_the_temporary_folder_is_private_and_goes_with_an_error(tmp_path, monkey
     assert "no space to sort them; expected 3.75 kB" in refused(tmp_path, unsorted())
     assert read_bytes(tmp_path, streamed())  # needs none
     assert [p.name for p in tmp_path.iterdir()] == ["a.mf4"]
-
-
-# --- cut ---
 
 
 @pytest.mark.parametrize("cut", [1, 23, 24, 100, 2400, 4799])
@@ -320,8 +314,6 @@ def test_where_nothing_is_left_the_missing_block_is_named(tmp_path, mark, at):
     assert f"the file ends at byte {at or begin + 20}" in line
     assert "Try" in line
 
-
-# --- links ---
 
 KINDS = {"DG": 24, "CG": 24, "CN": 24, "DL": 24}
 
@@ -526,9 +518,6 @@ def test_a_time_without_its_conversion_is_no_time(tmp_path):
     assert "its time channel cannot be read" in " ".join(faults.notes)
 
 
-# --- sizes ---
-
-
 def deflated(raw, *, size=None, invalidation=0, kind=0):
     b = Blocks()
     b.header()
@@ -619,8 +608,6 @@ def test_groups_that_asammdf_decodes_are_read_in_pieces_too(tmp_path):
                 np.testing.assert_array_equal(values, whole[channels[0].info.path])
 
 
-# --- texts ---
-
 LAUGHS = (
     '<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "ha">'
     + "".join(f'<!ENTITY {chr(98 + k)} "{f"&{chr(97 + k)};" * 10}">' for k in range(9))
@@ -703,8 +690,6 @@ def test_definitions_in_a_comment_are_not_followed(tmp_path):
     with MdfReader(tmp_path / "a.mf4", ReadOptions()) as r:
         assert r.channels()[0].comment == "speed"
 
-
-# --- attachments ---
 
 OPENED: list[str] = []
 WATCHED = [False]

@@ -47,9 +47,6 @@ def tree(folder):
     return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
 
 
-# --- content ----------------------------------------------------------------------------------------------------------
-
-
 def test_sections_come_in_their_order(page):
     places = [page.index(f'id="{s}"') for s in SECTIONS]
     assert places == sorted(places)
@@ -213,9 +210,6 @@ def test_tables_are_beside_the_page(folder, findings, case):
     assert (folder / "data" / "full_aquaplaning.csv").read_text().count("\n") == 1 + len(findings.full)
 
 
-# --- safety -----------------------------------------------------------------------------------------------------------
-
-
 def test_names_stay_text(folder, page):
     pages = [page, *((folder / n).read_text() for n in data_of(page)["runs"]["page"])]
     for html in pages:
@@ -304,9 +298,6 @@ def test_rim_of_a_wheel_that_stops_stands_still(case):
     assert data["t"] == pytest.approx(samples.t.tolist())
 
 
-# --- the folder -------------------------------------------------------------------------------------------------------
-
-
 def test_same_results_make_the_same_bytes(case, findings, folder, tmp_path):
     write_report(case, findings, tmp_path / "again")
     assert tree(tmp_path / "again") == tree(folder)
@@ -369,9 +360,6 @@ def test_command_line(case, tmp_path):
     other = run(campaign, "-o", tmp_path)
     assert other.exit_code == 2
     assert "holds other files" in other.stderr
-
-
-# --- numbers ----------------------------------------------------------------------------------------------------------
 
 
 def curve(values, half=0.05):
