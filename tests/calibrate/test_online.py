@@ -158,9 +158,6 @@ def test_sample_rate_does_not_matter(dt):
     assert out[-1] == pytest.approx(0.16 - 60.0 * 5e-4 * (1.0 - math.exp(-1.0)), abs=0.008)
 
 
-# --- what it does for the detector ------------------------------------------------------------------------------------
-
-
 def sensors(bias, drift):
     return ESC.with_channel(
         "a_x", replace(ESC.channels["a_x"], bias=bias, drift=drift, offset_spread=0.0, drift_spread=0.0)

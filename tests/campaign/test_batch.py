@@ -41,9 +41,6 @@ def own(tmp_path):
     return make_campaign(tmp_path, speeds=(80, 90, 100), repeats=1)
 
 
-# --- the samples ------------------------------------------------------------------------------------------------------
-
-
 def test_samples_agree_with_the_log_they_come_from(made):
     path = made / "logs" / "v100_0.parquet"
     signals = load_signals([path], vehicle=SEDAN)
@@ -86,9 +83,6 @@ def test_water_is_known_without_the_ends_of_the_lane(made):
     assert 1.5 <= wet.min() < 1.7
     assert 2.7 < wet.max() <= 2.9
     assert unknown.size == 12
-
-
-# --- the store --------------------------------------------------------------------------------------------------------
 
 
 def test_tables_open_by_themselves(made):
@@ -176,9 +170,6 @@ def test_a_folder_of_other_things_is_no_store(own, tmp_path):
     assert result.exit_code == 2
     assert "holds other files" in result.stderr
     assert run("batch", own, "-o", own.parent / "logs").exit_code == 2
-
-
-# --- bad logs ---------------------------------------------------------------------------------------------------------
 
 
 def test_bad_logs_are_named_and_the_others_done(own):

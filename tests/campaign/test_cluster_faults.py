@@ -201,9 +201,6 @@ def test_results_that_went_elsewhere_are_missed(campaign, tmp_path):
         run_batch(configure(campaign), Store(tmp_path / "s"), elsewhere=elsewhere)
 
 
-# --- processes of their own -------------------------------------------------------------------------------------------
-
-
 def command(campaign, store, address):
     return [
         sys.executable, "-m", "aqualog", "batch", str(campaign), "-o", str(store), "--cluster", address, "--progress",

@@ -185,9 +185,6 @@ def test_copies_are_fetched_ahead_and_go_with_the_store(plain, url):
         place.copy(names[0])
 
 
-# --- what goes wrong --------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("address", "text"),
     [
@@ -312,9 +309,6 @@ def test_addresses(tmp_path):
     assert Remote("other://user:word@host/x").name == "other://***@host/x"
     with pytest.raises(ConfigError, match="chain"):
         address_of("zip://a::file://b")
-
-
-# --- servers of their own ---------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

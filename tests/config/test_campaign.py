@@ -237,8 +237,6 @@ def test_faults_of_labels_are_told_once(tmp_path, text, parts):
     assert "did you mean" not in told
 
 
-# --- tables as spreadsheets write them ---------------------------------------------------------------------------
-
 PLAIN = "log,tyre,pressure_rear_bar,lane_start_s,lane_end_s,x_driver\na.mf4,s,1.9,1,2.5,Jörg\nb.mf4,,,,,\n"
 GERMAN = PLAIN.replace(",", ";").replace("1.9", "1,9").replace("2.5", "2,5")
 

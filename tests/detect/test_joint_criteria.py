@@ -98,8 +98,6 @@ def test_a_criterion_that_began_under_braking_does_not_count():
     assert not watched(JOINT_CRITERIA, replace(seen, braking=braking))[0].active.any()
 
 
-# --- joint detector 2 -----------------------------------------------------------------------------------------------
-
 ALL = {"spin_up": 1.5, "spin_down": 1.5, "resistance": 0.3, "minor_spin_down": 4.0, "slip_slope_drop": 0.75}
 
 
@@ -178,9 +176,6 @@ def test_without_resistance_the_sum_does_not_warn_unless_asked_to(gated):
     found, _, _ = watched(JOINT_CUSUM, seen, settings, threshold=1.2)
     assert found.active.all() != gated
     assert found.statistic == pytest.approx(2.0)
-
-
-# --- where a lost slope counts -----------------------------------------------------------------------------------------
 
 
 def allowed(x, v_x, dropped, loss):

@@ -23,9 +23,6 @@ def one(x):
     return np.array([float(x)])
 
 
-# --- chapter 2, wheels ------------------------------------------------------------------------------------------------
-
-
 def drive(n=300, v=25.0, **changed):
     """A steady drive of the default car on which single signals are replaced."""
     columns = {
@@ -116,9 +113,6 @@ def test_C31_roughness_that_both_axles_see_cancels():
     delta, var = variance_difference(road, road)
     assert (delta == 0.0).all()
     assert var[-1] > 10.0
-
-
-# --- chapter 2, resistance --------------------------------------------------------------------------------------------
 
 
 def test_C34_resistance_measure_is_positive_for_more_resistance():

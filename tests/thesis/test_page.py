@@ -131,8 +131,6 @@ def test_colours_are_left_to_the_page_and_solid_panels_are_solid():
             assert kinds <= ({"scatter3d", "surface"} if p.z else {"scatter"})
 
 
-# --- the reproduction
-
 HOSTILE_FOUND = "</script><img src=x onerror=\"document.body.dataset.hit='1'\">"
 
 

@@ -61,9 +61,6 @@ def test_C84_standstill_tells_nothing():
         assert np.isfinite(quotient(rolling, np.zeros(3))).all()
 
 
-# --- change detection -------------------------------------------------------------------------------------------------
-
-
 def sums_by_hand(nu, zeta, *, clamp):
     """3.24 in steps of DT; both sides."""
     g, rows = np.zeros(2), []
@@ -153,8 +150,6 @@ def test_C90_in_the_estimator(offset, tau):
     assert not (found[True] < 0).any()
     assert not found[False].any()
 
-
-# --- activation -------------------------------------------------------------------------------------------------------
 
 FINE = {"v_x": 25.0, "a_x": 0.5, "a_y": 0.1, "yaw_rate": 0.01, "a_w_delta": 0.3, "is_braking": False}
 
@@ -251,9 +246,6 @@ def test_C91_bounds_of_differential_traction_and_slip(sample, status):
     assert e.slope[0] == 1.0 / after.belief.k
 
 
-# --- sensitivity ------------------------------------------------------------------------------------------------------
-
-
 def rear_share(a_x):
     """Rear share of the half-car's load at an acceleration."""
     return 0.5 + CAR.h_cg / (CAR.l_f + CAR.l_r) * a_x / 9.80665
@@ -305,9 +297,6 @@ def test_C96_excitation_cures_availability(v0, nu, waveform):
     assert np.mean(e.status[1000:] == estimator.ESTIMATING) > 0.75
     assert e.slope[-1] == pytest.approx(30.0, rel=0.1)
     assert e.slope_sd[-1] < 0.2 * e.slope_sd[0]
-
-
-# --- the evaluation of 3.3 --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("waveform", ["triangle", "sine", "ramp", "step"])

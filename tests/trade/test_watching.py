@@ -294,9 +294,6 @@ def test_the_page_renews_itself_and_holds_what_counts(track, stock):
     assert "refresh" not in watch_page(found, title="m", clock="14:03, ended", refresh_s=0)
 
 
-# --- the command -----------------------------------------------------------------------------------------------------
-
-
 def test_once(tmp_path, stock, monkeypatch):
     monkeypatch.setattr(face, "SETTLE_S", 0.2)
     track = Track(tmp_path)

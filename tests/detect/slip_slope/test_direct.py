@@ -56,9 +56,6 @@ def holds(ci, x):
     return ci[0] <= x <= ci[1]
 
 
-# --- the line --------------------------------------------------------------------------------------------------------
-
-
 def test_line_without_noise_is_exact():
     t, mu, slip, is_used = samples(0, noise_slip=1e-11)
     line = fit_line(mu[is_used], slip[is_used], block_labels(t[is_used]))
@@ -138,9 +135,6 @@ def test_slope_that_could_be_infinite_is_not_told():
     assert "holds 0" in line.reason
 
 
-# --- over the session ------------------------------------------------------------------------------------------------
-
-
 def judged(seed, **kw):
     t, mu, slip, is_used = samples(seed, **kw)
     t, mu, slip = t[is_used], mu[is_used], slip[is_used]
@@ -206,9 +200,6 @@ def test_trend_by_hand():
     assert found.change == pytest.approx(0.9 / 1.1 - 1.0, rel=1e-6)
 
 
-# --- traction from the accelerometer ---------------------------------------------------------------------------------
-
-
 def test_traction_of_one_axle_is_that_of_the_torque():
     """On a grade, with drag and inertia: the accelerometer and the wheel torque must say the same."""
     n = 50
@@ -240,9 +231,6 @@ def test_lifted_wheel_has_no_traction_coefficient():
     )  # fmt: skip
     assert math.isnan(mu[0, 0])
     assert mu[1, 0] == pytest.approx((1600.0 + 0.36 + 80.0 + 20.0) / 2.0 / 8000.0)
-
-
-# --- whole drives ----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("car", [RWD, FWD], ids=["rwd", "fwd"])
@@ -385,9 +373,6 @@ def test_recursion_is_told_the_noise_of_the_wheels():
     assert not any("sudden changes" in n for n in found.notes)
 
 
-# --- a velocity that is late ------------------------------------------------------------------------------------------
-
-
 def changed(signals, **columns):
     return replace(signals, frame=signals.frame.with_columns(**{k: pl.Series(v) for k, v in columns.items()}))
 
@@ -452,9 +437,6 @@ def test_parts_of_a_session_know_the_delay_of_the_whole():
 def test_delay_is_that_of_a_velocity():
     with pytest.raises(ConfigError, match="--delay"):
         slip_slopes(drive(RWD), RWD, delay=0.1)
-
-
-# --- what is no result ------------------------------------------------------------------------------------------------
 
 
 def refused(signals, car, **kw):
@@ -539,9 +521,6 @@ def test_recursion_at_its_bound_is_no_result():
         slip_slopes(changed(signals, **columns), AWD, method="differential")
 
 
-# --- changes that are too large for a number ---------------------------------------------------------------------------
-
-
 def test_large_changes_are_words():
     assert percent(math.inf) == "more than 10 times"
     assert percent(-math.inf) == "less than 1/10"
@@ -552,9 +531,6 @@ def test_large_changes_are_words():
         assert found.change == change
     verdicts = [judged(seed, seconds=200.0, noise_slip=4e-3)[0] for seed in range(10)]
     assert not any("inf" in v.sentence or "nan" in v.sentence for v in verdicts)
-
-
-# --- lag --------------------------------------------------------------------------------------------------------------
 
 
 def test_lag_of_constant_signals_is_not_told():

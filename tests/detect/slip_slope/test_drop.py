@@ -218,9 +218,6 @@ def test_runs_side_by_side_lose_nothing(tmp_path):
     assert len(load_history(path).periods) == 40
 
 
-# --- which wheels -----------------------------------------------------------------------------------------------------
-
-
 def test_pairs_of_each_drivetrain():
     """C87: at the driven axle with one driven axle; per side, or the axles' means."""
     assert [(p.place, p.wheel, p.i, p.j) for p in pairs(RWD)] == [
@@ -232,9 +229,6 @@ def test_pairs_of_each_drivetrain():
     assert [(p.wheel, p.i, p.j) for p in pairs(AWD)] == [(None, ("fl",), ("rl",)), (None, ("fr",), ("rr",))]
     assert [(p.i, p.j) for p in pairs(AWD, form="r")] == [(("rl",), ("fl",)), (("rr",), ("fr",))]
     assert [(p.i, p.j) for p in pairs(AWD, per_axle=True)] == [(("fl", "fr"), ("rl", "rr"))]
-
-
-# --- simulated drives with series sensors -----------------------------------------------------------------------------
 
 
 def drive(vehicle, seed=5, memory=None, **kw):

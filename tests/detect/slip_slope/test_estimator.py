@@ -59,9 +59,6 @@ def disparity(a, b, prior):
     return np.abs((a - b) / np.outer(sd, sd)).max()
 
 
-# --- one update -------------------------------------------------------------------------------------------------------
-
-
 def test_update_is_the_textbooks():
     """Joseph's form with the optimal gain is (1 - K H) P."""
     rng = np.random.default_rng(1)
@@ -137,9 +134,6 @@ def test_covariance_stays_positive(q):
         least = min(least, np.linalg.eigvalsh(P / np.outer(sd, sd)).min())
     # correlations: positive definite with process noise, to rounding without
     assert least > (0.0 if q else -1e-12)
-
-
-# --- least squares ----------------------------------------------------------------------------------------------------
 
 
 def batch(H, y, x0, P0, r):
@@ -255,8 +249,6 @@ def test_begins_as_its_tuning_says():
     soft = estimator.initial_state(TUNING, slope=12.0).belief
     assert math.sqrt(soft.P_kk) / soft.k == pytest.approx(math.sqrt(state.belief.P_kk) / state.belief.k)
 
-
-# --- matched data: the filter's own model is the truth ----------------------------------------------------------------
 
 RUNS, SECONDS, RATE = 400, 60, 50.0
 CHECKS = (2.0, 5.0, 20.0, 60.0)  # [s]
@@ -418,8 +410,6 @@ def test_slope_within_its_standard_deviation(gates):
         assert np.mean(nis) == pytest.approx(1.0, abs=0.02)
 
 
-# --- what data cannot tell --------------------------------------------------------------------------------------------
-
 T600 = np.arange(60_000) * DT
 
 
@@ -554,9 +544,6 @@ def test_both_forms_give_the_same_slopes():
     assert found["R"] == pytest.approx((C_R, C_R / C_F, -2e-3), rel=0.02)
 
 
-# --- bounds, gaps and faults ------------------------------------------------------------------------------------------
-
-
 def test_slope_and_ratio_stay_within_sense():
     """Data that no tyre makes: slopes from 1 to 300, ratios from 0.2 to 5."""
     t = T600[:6000]
@@ -610,9 +597,6 @@ def test_nothing_in_nothing_out():
     e, state = scan(np.empty(0), np.empty(0))
     assert e.slope.size == e.status.size == 0
     assert state == estimator.initial_state(TUNING, slope=30.0)
-
-
-# --- changes of the road ----------------------------------------------------------------------------------------------
 
 
 def road_noise(n, seed=0):
@@ -786,8 +770,6 @@ def test_threshold_and_drift_are_those_of_the_tuning():
         assert not e.alarm.any()
 
 
-# --- sample rate ------------------------------------------------------------------------------------------------------
-
 CAR = HalfCar()
 ON_SNOW = SurfaceChange(40.0, 10.0, 10.0, 0.4)
 
@@ -834,9 +816,6 @@ def test_doubt_does_not_depend_on_the_rate(physical_run):
         scan(*sampled(physical_run, every), dt=1e-3 * every)[0].slope_sd[round(39.9e3 / every)] for every in (20, 10, 2)
     ]
     assert np.ptp(doubt) / np.mean(doubt) < 0.01
-
-
-# --- slow and sudden (C115) -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("drift", [3e-3, -3e-3])

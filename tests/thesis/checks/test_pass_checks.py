@@ -40,8 +40,6 @@ PASSES = [m for module in (spins, resistance, slip_slope, joint) for m in module
 MAKERS = {m.claims[0]: m.checks for m in PASSES}
 SEEDS = (1, 2, 3, 4)
 
-# --- passes -----------------------------------------------------------------------------------------------------------
-
 
 def test_a_dry_pass_shows_nothing():
     f = figures_of(Pass(98, h=0.0), 1)
@@ -93,9 +91,6 @@ def test_kick_and_wiggle_are_in_the_torque():
     )
     assert np.max(kicked - plain) == pytest.approx(500.0, rel=0.2)
     assert np.ptp(wiggling[:1900]) == pytest.approx(250.0, rel=0.2)
-
-
-# --- tables and intervals ---------------------------------------------------------------------------------------------
 
 
 def test_a_table_is_made_once_and_dry_passes_with_two_seeds(monkeypatch):
@@ -176,9 +171,6 @@ def test_rank_correlation():
     assert rank_correlation(x, -(x**3)) == -1.0
     assert rank_correlation(x, np.array([1.0, 3.0, 2.0, 4.0])) == pytest.approx(0.8)
     assert np.isnan(rank_correlation(x[:2], x[:2]))
-
-
-# --- criteria ---------------------------------------------------------------------------------------------------------
 
 
 def template(**kw):

@@ -42,9 +42,6 @@ def chosen(runs, wish, is_of_use=lambda r: ""):
     return choose(runs, wish, campaign="c", number="2.0", is_of_use=is_of_use, needs="something")
 
 
-# --- selection --------------------------------------------------------------------------------------------------------
-
-
 def test_the_configuration_like_the_thesis_is_chosen_though_another_has_more_runs():
     like = [run_info(i, tyre="worn_summer", pressure_rear_bar=1.9, water_depth_mm=d) for i, d in enumerate((0.6, 1.3))]
     more = [
@@ -102,9 +99,6 @@ def test_wear_by_tread_by_word_by_name():
     assert wear_rank(("x", "new", 1.6)) == 1.6
     assert wear_rank((None, "very_worn", None)) < wear_rank((None, "worn", None)) < wear_rank(("new_x", None, None))
     assert wear_rank(("blue", None, None)) is None
-
-
-# --- figures ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("number", MADE)
@@ -167,9 +161,6 @@ def test_constants_are_the_runs_own_dry_level():
     before = (samples.on_water == 0) & samples.is_usable & np.isfinite(delta) & (samples.t < e.of(info).entry)
     assert before.sum() > 10
     assert y[which] == pytest.approx(delta[which] - delta[before].mean(), nan_ok=True)
-
-
-# --- verdicts follow the numbers --------------------------------------------------------------------------------------
 
 
 def level(name, *value):

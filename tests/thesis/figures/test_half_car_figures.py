@@ -23,8 +23,6 @@ from aqualog.thesis.record import seconds, stem_of
 from aqualog.thesis.run import make
 from tests.thesis.made import all_made, check, made
 
-# --- records ----------------------------------------------------------------------------------------------------------
-
 
 def test_rows_of_all_figures():
     assert len(catalogue.NUMBERS) == 36 + 1  # W.1 is not of the thesis
@@ -106,9 +104,6 @@ def test_numbers_that_are_asked_for():
             catalogue.chosen([wrong])
 
 
-# --- curves -----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("slope", "mu_max"), [(30.0, 1.0), (10.0, 0.4)])
 def test_brush_solved_for_slip_and_its_tangent(slope, mu_max):
     mu = np.linspace(-0.9, 0.9, 37) * mu_max
@@ -138,9 +133,6 @@ def test_blind_split_by_hand():
 def test_slopes_of_projected_lines():
     rows = made("3.4").tables[0].rows
     assert [float(r[2]) for r in rows] == pytest.approx([30.0, 10.0], rel=1e-3)
-
-
-# --- the study --------------------------------------------------------------------------------------------------------
 
 
 def by_hand(wave, period, a_x, mu_min, amplitude=250.0, kind="force"):
@@ -271,9 +263,6 @@ def test_thin_lines_are_where_the_estimator_is_idle():
     assert np.array_equal(np.isnan(bold.y), idle)
     assert not (np.isnan(bold.y) & np.isnan(thin.y)).any()
     assert dot.x[0] == timeline.detection_time(case)
-
-
-# --- verdicts follow the runs -----------------------------------------------------------------------------------------
 
 
 OF_TIMES = {"3.6": waveforms, "3.9": periods, "3.10": amplitudes, "3.11": periods}
