@@ -20,6 +20,7 @@ import os
 import pickle
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -56,8 +57,15 @@ def margin_kmh(signals) -> str:
     return "" if not np.isfinite(best) else f"{10.0 * np.floor(best / 10.0):g}"
 
 
-def made(name: str, seed: int, pool_name: str):
-    """A drawn drive with its labels."""
+def with_terms(scenario, seed: int):
+    """The same drive on an uneven road, with rims that swing and friction of the steering."""
+    front, rear = (replace(t, torsion_frequency=38.0) for t in (scenario.tyre_front, scenario.tyre_rear))
+    road = (16e-6, 64e-6)[seed % 2]
+    return replace(scenario, unevenness=road, steering_friction=150.0, tyre_front=front, tyre_rear=rear)
+
+
+def made(name: str, seed: int, pool_name: str, *, terms: bool = False):
+    """A drawn drive with its labels; `terms` of the simulator that are off by default."""
     from aqualog.evaluate.drives import Drive, labels_in
     from aqualog.model import situations
     from aqualog.model.log import as_signals
@@ -66,7 +74,8 @@ def made(name: str, seed: int, pool_name: str):
     pool = {"tuning": situations.TUNING_POOL, "scoring": situations.SCORING_POOL}[pool_name]
     drawn = situations.draw(name, seed, pool)
     believed = with_tie_rods(drawn.believed, drawn.scenario)
-    signals = as_signals(simulate(drawn.scenario, drawn.model), vehicle=believed)
+    driven = with_terms(drawn.scenario, seed) if terms else drawn.scenario
+    signals = as_signals(simulate(driven, drawn.model), vehicle=believed)
     lanes = [max(lane.depth_left, lane.depth_right) for lane in drawn.scenario.lanes]
     groups = {
         "manoeuvre": name,
@@ -94,7 +103,7 @@ def chunk(seed: int, options: dict) -> dict:
     drives, failed = [], {}
     for name in options["situations"]:
         try:
-            drive = made(name, seed, options["pool"])
+            drive = made(name, seed, options["pool"], terms=options["terms"])
             records = {1.0: judge(drive, thresholds=own, rivals=asked)}
             for factor in FACTORS if options["roc"] else ():
                 if factor != 1.0:
@@ -216,6 +225,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--pool", choices=("tuning", "scoring"), default="scoring")
     parser.add_argument("--rivals", action="store_true")
+    parser.add_argument("--terms", action="store_true", help="with terms that are off by default, see `with_terms`")
     parser.add_argument("--roc", action="store_true", help="also at scaled thresholds; takes about ten times as long")
     parser.add_argument("--thresholds", default="", help="thresholds file")
     parser.add_argument("--tune", type=Path, help="choose thresholds from the curves and write them (pool tuning)")
@@ -228,6 +238,7 @@ def main() -> None:
         "code": code_stamp(),
         "pool": a.pool,
         "rivals": a.rivals,
+        "terms": a.terms,
         "roc": a.roc,
         "thresholds": a.thresholds,
         "values": Path(a.thresholds).read_text(encoding="utf-8") if a.thresholds else "",

@@ -1,7 +1,8 @@
 """How well `aqualog test straight` measures: simulated runs of 8 tyres whose speed of 15 % slip is known.
 
 The truth of a run is the crossing of the simulator's own slip, without noise. The runs are measured from what the
-series sensors report. `python -m tests.trade.study [--runs 150] [--car hatch|saloon]` prints one line for each question.
+series sensors report. `python -m tests.trade.study [--runs 150] [--first 50000] [--car hatch|saloon]`
+prints one line for each question.
 """
 
 from __future__ import annotations
@@ -219,11 +220,12 @@ def order(pool: list[Made]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--runs", type=int, default=150)
+    parser.add_argument("--first", type=int, default=50_000, help="first seed")
     parser.add_argument("--faults", type=int, default=16)
     parser.add_argument("--car", choices=("hatch", "saloon"), default="hatch")
     given = parser.parse_args()
     car = HATCH if given.car == "hatch" else SALOON
-    pool = sound(car, given.runs)
+    pool = sound(car, given.runs, given.first)
     print(f"{car.name}, {len(pool)} runs of {len(TYRE_KMH)} tyres")
     for work in (
         lambda: bias(pool), lambda: coverage(pool), lambda: coverage(pool, 100, lane_kmh=1.0), lambda: order(pool),
