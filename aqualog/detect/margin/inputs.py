@@ -15,7 +15,7 @@ from aqualog.physics.load import G
 
 __all__ = ["Reader"]
 
-V_MIN = 11.0  # [m/s] slower, water does nothing that counts
+V_MIN = 5.0  # [m/s] slower, wheel speeds are too coarse
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering costs more than the balance knows
 A_MOST, A_LEAST = 0.5, -1.5  # [m/s^2] beyond, an unknown trailer shows more than water; braking
 U_MAX = 0.25  # [-] of the traction: beyond, the slip of a dry tyre is no longer a line

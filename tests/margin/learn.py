@@ -1,0 +1,184 @@
+"""Learn what water and dry roads show: `aqualog/detect/margin/emissions.toml`.
+
+    python -m tests.margin.learn gather --passes 6000 --drives 20 --to /tmp/windows.npz
+    python -m tests.margin.learn fit --from /tmp/windows.npz
+
+Windows come from passes whose tyres are drawn by `passes.any_tyre`, and from dry drives of the tuning pool. What is
+compared with is learnt from the dry road before, by the filter itself, which is told where the water is.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from aqualog.detect.braking import BrakeWatch
+from aqualog.detect.detector import Scene
+from aqualog.detect.margin import emissions as kept
+from aqualog.detect.margin.emissions import COVARIATES, FEATURES, FULL_SPEEDS, NODES, VERSION, Emissions
+from aqualog.detect.margin.inputs import Reader
+from aqualog.detect.margin.recursion import scan
+from aqualog.detect.margin.state import Filter, Inputs
+from aqualog.detect.margin.watch import params
+from aqualog.features.stream import FeatureStream
+from aqualog.model.drawing import KMH, TUNING_POOL
+from aqualog.model.log import as_signals
+from aqualog.model.simulate import simulate
+from aqualog.model.situations import draw
+from tests.detect.episode_study import DRY
+from tests.margin.passes import own_pass
+
+DRIVETRAINS = ("rwd", "fwd", "awd")
+TARGET = Path(kept.__file__).with_name("emissions.toml")
+DISTANCE = (-20.0 * KMH, 100.0 * KMH)
+_N = len(FEATURES)
+BANDWIDTH = 0.06  # [-] of the log ratio
+TAIL = 6.0  # as `FilterParams.tail`
+KINDS = 6
+NEUTRAL = Emissions(
+    np.zeros((NODES.size, _N, COVARIATES)), np.tile(1e9 * np.eye(_N), (NODES.size, 1, 1)), np.ones(NODES.size),
+    np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((1, _N, COVARIATES)), 1e9 * np.eye(_N)[None],
+    np.ones(1),
+)  # fmt: skip
+
+
+def windows(columns, vehicle, dt: float, wet):
+    """Features and covariates (steps, 8), NaN where one is missing, of a drive; `wet` [s]: where the water is."""
+    columns = {s: x for s, x in columns.items() if not s.startswith("true_") and np.isfinite(x).any()}
+    stream = FeatureStream(vehicle, dt, columns)
+    f = stream.push(columns)
+    known = {s: columns[s] for s in stream.available}
+    inputs = Reader(vehicle, dt).push(Scene(f, BrakeWatch(vehicle, dt).push(f, known), known))
+    p = params(vehicle, dt)
+    state, rows = Filter.new(p, NEUTRAL), []
+    for k in range(f["v_x_hat"].size // p.block):
+        at = slice(k * p.block, (k + 1) * p.block)
+        is_wet = wet[0] - 0.1 <= k * p.dt < wet[1] + 1.0
+        state.water[0], state.dry[0] = (1.0, 0.0) if is_wet else (0.0, 1.0)
+        _, state = scan(p, NEUTRAL, state, Inputs(*(x[at] for x in inputs)))
+        traction = np.nanmean(np.nansum(state.window[:, 5:9], axis=1)) * 0.5
+        v = state.window[int(state.samples[1] - 1) % 6, 0]
+        x = state.x[0] if (state.x[1] < 1.0).all() and v > p.v_least else np.full(_N, np.nan)
+        with np.errstate(invalid="ignore"):
+            rows.append((*x, 1.0, np.log(v / 30.0), np.arcsinh(traction / 0.02)))
+    return np.array(rows)
+
+
+def gather(a: argparse.Namespace) -> None:
+    """Windows with drivetrain, kind (-1 water, else the number of the dry situation), log ratio, pass, contact."""
+    found = []
+    for n in range(a.passes):
+        p = own_pass(a.first + n, DRIVETRAINS[n % 3], distance=DISTANCE, broad=True)
+        x = windows(p.columns, p.vehicle, p.dt, p.wet)
+        d = n % 3
+        for after in (0.8, 1.4, 2.0, 2.6, 3.2, 3.7):
+            k = round((p.wet[0] + after) / 0.1)
+            if k < len(x):
+                v = 30.0 * np.exp(x[k, 6])
+                found.append((d, -1.0, np.log(p.v_full / v), n, p.contact(v), *x[k]))
+        for k in range(40, round(p.wet[0] / 0.1) - 2, 20):
+            found.append((d, -2.0, np.nan, n, np.nan, *x[k]))
+        if n % 300 == 299:
+            print(n + 1, flush=True)
+            np.savez(a.to, x=np.array(found))
+    for n in range(a.drives):
+        for i, name in enumerate(DRY):
+            drawn = draw(name, a.first + n, TUNING_POOL)
+            signals = as_signals(simulate(drawn.scenario, drawn.model), vehicle=drawn.believed)
+            columns = {s: signals.array(s) for s in signals.symbols}
+            x = windows(columns, drawn.believed, signals.dt_ns * 1e-9, (1e9, 1e9))
+            d = DRIVETRAINS.index(drawn.believed.drivetrain)
+            found += [(d, float(i), np.nan, n, np.nan, *row) for row in x[30::5]]
+        print("dry", n + 1, flush=True)
+        np.savez(a.to, x=np.array(found))
+
+
+def water(x, where, contact):
+    """Mean by covariates, scatter and contact at each node: local regression on the log ratio, by Student's law."""
+    mean, scatter, share = [], [], []
+    features, z = x[:, :_N], x[:, _N:]
+    for node in NODES:
+        away = where - node
+        near = np.exp(-0.5 * (away / BANDWIDTH) ** 2)
+        form = np.column_stack([z, away])
+        w = near.copy()
+        for _ in range(6):
+            fit = np.linalg.solve((w[:, None] * form).T @ form + 1e-3 * np.eye(COVARIATES + 1), (w[:, None] * form).T @ features)
+            left = features - form @ fit
+            S = (w[:, None] * left).T @ left / near.sum() + 1e-3 * np.eye(_N)
+            square = np.einsum("ni,ij,nj->n", left, np.linalg.inv(S), left)
+            w = near * (TAIL + _N) / (TAIL + square)
+        mean.append(fit[:COVARIATES].T)
+        scatter.append(S)
+        share.append(float(near @ contact / near.sum()))
+    return np.array(mean), np.array(scatter), np.array(share)
+
+
+def dry(x, rng):
+    """Means, covariances and shares of `KINDS` kinds of dry windows: a mixture of Student's laws."""
+    mean = x[rng.choice(len(x), KINDS, replace=False)]
+    S = np.tile(np.cov(x.T), (KINDS, 1, 1))
+    share = np.full(KINDS, 1.0 / KINDS)
+    for _ in range(150):
+        left = x[None] - mean[:, None]
+        square = np.einsum("kni,kij,knj->kn", left, np.linalg.inv(S), left)
+        logs = np.log(share)[:, None] - 0.5 * np.linalg.slogdet(S)[1][:, None]
+        logs = logs - 0.5 * (TAIL + _N) * np.log1p(square / TAIL)
+        r = np.exp(logs - logs.max(axis=0))
+        r /= r.sum(axis=0)
+        w = r * (TAIL + _N) / (TAIL + square)
+        share = r.mean(axis=1)
+        mean = (w[..., None] * x[None]).sum(axis=1) / w.sum(axis=1)[:, None]
+        left = x[None] - mean[:, None]
+        S = np.einsum("kn,kni,knj->kij", w, left, left) / r.sum(axis=1)[:, None, None] + 1e-3 * np.eye(_N)
+    order = np.argsort(-share)
+    return mean[order], S[order], share[order]
+
+
+def _text(x) -> str:
+    if np.ndim(x) == 0:
+        return f"{float(x):.4g}"
+    return "[" + ", ".join(_text(y) for y in x) + "]"
+
+
+def fit(a: argparse.Namespace) -> None:
+    found = np.load(a.source)["x"]
+    found = found[np.isfinite(found[:, 5:]).all(axis=1)]
+    out = [f"# Made by `python -m tests.margin.learn`; {len(found)} windows.", f"version = {VERSION}"]
+    inside = np.clip(np.log(FULL_SPEEDS / KMH / 60.0) / 0.1, -9.0, 0.0) + np.clip(
+        np.log(150.0 / (FULL_SPEEDS / KMH)) / 0.1, -9.0, 0.0
+    )
+    prior = np.exp(-0.5 * inside**2) / np.exp(-0.5 * inside**2).sum()
+    is_dry = found[:, 1] != -1.0
+    for d, name in enumerate(DRIVETRAINS):
+        some = (found[:, 0] == d) & ~is_dry
+        mean, scatter, contact = water(found[some, 5:], found[some, 2], found[some, 4])
+        m, S, share = dry(found[is_dry & (found[:, 0] == d), 5 : 5 + _N], np.random.default_rng(1))
+        m = np.concatenate([m[..., None], np.zeros((KINDS, _N, COVARIATES - 1))], axis=2)
+        tables = Emissions(mean, scatter, contact, np.maximum(prior, 1e-6), m, S, share)
+        out.append(f"\n[{name}]")
+        for field, x in tables._asdict().items():
+            rows = x if x.ndim > 1 else [x]
+            body = ",\n".join(_text(r) for r in rows)
+            out.append(f"{field} = [\n{body},\n]" if x.ndim > 1 else f"{field} = {body}")
+        print(name, some.sum(), "windows; kinds of dry", np.round(share, 3))
+        print(np.round(m[..., 0], 2), np.round(np.sqrt(np.einsum("kii->ki", S)), 2), sep="\n")
+    TARGET.write_text("\n".join(out) + "\n", encoding="utf-8")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("gather", "fit"))
+    parser.add_argument("--passes", type=int, default=6000)
+    parser.add_argument("--drives", type=int, default=20)
+    parser.add_argument("--first", type=int, default=100_000)
+    parser.add_argument("--from", dest="source", type=Path, default=Path("/tmp/windows.npz"))
+    parser.add_argument("--to", type=Path, default=Path("/tmp/windows.npz"))
+    a = parser.parse_args()
+    {"gather": gather, "fit": fit}[a.what](a)
+
+
+if __name__ == "__main__":
+    main()
