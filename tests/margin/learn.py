@@ -105,7 +105,9 @@ def water(x, where, contact):
         form = np.column_stack([z, away])
         w = near.copy()
         for _ in range(6):
-            fit = np.linalg.solve((w[:, None] * form).T @ form + 1e-3 * np.eye(COVARIATES + 1), (w[:, None] * form).T @ features)
+            fit = np.linalg.solve(
+                (w[:, None] * form).T @ form + 1e-3 * np.eye(COVARIATES + 1), (w[:, None] * form).T @ features
+            )
             left = features - form @ fit
             S = (w[:, None] * left).T @ left / near.sum() + 1e-3 * np.eye(_N)
             square = np.einsum("ni,ij,nj->n", left, np.linalg.inv(S), left)

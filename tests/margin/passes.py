@@ -78,15 +78,16 @@ def own_full(tyre: Tyre, vehicle: Vehicle, depth: float, p: float) -> float:
 
 def any_tyre(tyre: Tyre, rng: np.random.Generator) -> Tyre:
     """A tyre whose laws of water, contact, drag and friction are drawn far wider than sources have them."""
+
     def even(low: float, high: float) -> float:
         return float(low * (high / low) ** rng.uniform())
 
     return replace(
         tyre, v_anchor=tyre.v_anchor * even(0.85, 1.15), pressure_exponent=even(0.2, 0.5), thin_gain=even(0.2, 0.9),
-        tread_gain=even(10.0, 50.0), contact_exponent=even(1.8, 6.0), wedge_arm=tyre.wedge_arm * rng.uniform(0.0, 1.5),
+        tread_gain=even(10.0, 50.0), contact_exponent=even(1.5, 6.0), wedge_arm=tyre.wedge_arm * 1.5 * rng.uniform() ** 2,
         h_film=even(0.15e-3, 1.0e-3), groove_relief=rng.uniform(0.2, 0.9), h_wave=even(0.8e-3, 4e-3),
-        h_track=even(0.2e-3, 0.8e-3), width=even(0.12, 0.25), wet_friction=rng.uniform(0.65, 0.95),
-        load_sensitivity=rng.uniform(0.0, 0.3), contact_scatter=even(0.01, 0.12), scatter_length=even(0.2, 2.0),
+        h_track=even(0.2e-3, 0.8e-3), width=tyre.width * rng.uniform(0.2, 1.4), wet_friction=rng.uniform(0.65, 0.95),
+        load_sensitivity=rng.uniform(0.0, 0.3), contact_scatter=even(0.001, 0.12), scatter_length=even(0.2, 2.0),
         track_irregularity=even(0.03, 0.4), slip_slope_factor=tyre.slip_slope_factor * even(0.8, 1.2),
     )  # fmt: skip
 
@@ -118,9 +119,10 @@ def own_pass(
     approach, stay = k.between(9.0, 16.0), 4.0
     a = k.between(-0.4, 0.4) if k.between(0.0, 1.0) < 0.3 else 0.0
     start = (v - a * 4.0) * (approach - 4.0) + 4.0 * (v - 2.0 * a)
+    calm = float(0.03 ** k.rng.uniform()) if broad else 1.0
     lane = Lane(
         start, start + stay * v, in_metres=True, depth_left=depth * k.between(0.6, 1.0), depth_right=depth,
-        irregularity_left=k.between(0.05, 0.4), irregularity_right=k.between(0.03, 0.4 if broad else 0.15),
+        irregularity_left=calm * k.between(0.05, 0.4), irregularity_right=calm * k.between(0.03, 0.4 if broad else 0.15),
     )  # fmt: skip
     speed = ((0.0, v - 4.0 * a), (approach - 4.0, v - 4.0 * a), (approach, v), (approach + stay, v + stay * a))
     scenario = k.drive(approach + stay + 2.0, speed, lanes=(lane,))

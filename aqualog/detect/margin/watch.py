@@ -22,8 +22,8 @@ from aqualog.detect.detector import (
     missing_wheels,
     too_slow,
 )
-from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.emissions import emissions_of
+from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.recursion import scan
 from aqualog.detect.margin.state import OUTPUTS, Filter, FilterParams
 
