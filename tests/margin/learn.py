@@ -10,6 +10,7 @@ compared with is learnt from the dry road before, by the filter itself, which is
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,8 @@ from aqualog.model.drawing import KMH, TUNING_POOL
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import draw
+from aqualog.model.tyre import TYRES
+from aqualog.physics.hydroplaning import gallaway_speed, usf_speed
 from tests.detect.episode_study import DRY
 from tests.margin.passes import own_pass
 
@@ -37,6 +40,11 @@ _N = len(FEATURES)
 BANDWIDTH = 0.06  # [-] of the log ratio
 TAIL = 6.0  # as `FilterParams.tail`
 KINDS = 6
+DEPTHS, PRESSURES, TREADS = (0.6e-3, 6e-3), (1.8e5, 2.9e5), (1e-3, 8e-3)  # [m, Pa, m] that a prior is a mean over
+LOAD = np.array(4000.0)  # [N]
+TEXTURE = 0.8e-3  # [m] mean texture depth of asphalt
+STOPS_AT = 0.93  # a free wheel stops at about this share of the speed at which its contact ends
+LAW_SD = 0.20  # [-] log of a tyre's full speed about a law
 NEUTRAL = Emissions(
     np.zeros((NODES.size, _N, COVARIATES)), np.tile(1e9 * np.eye(_N), (NODES.size, 1, 1)), np.ones(NODES.size),
     np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((1, _N, COVARIATES)), 1e9 * np.eye(_N)[None],
@@ -139,6 +147,26 @@ def dry(x, rng):
     return mean[order], S[order], share[order]
 
 
+def prior(rng):
+    """How likely each full speed is before any evidence: of tyres, pressures and depths, by three laws that disagree."""
+    n = 4000
+    h, p, tread = (low * (high / low) ** rng.uniform(size=n) for low, high in (DEPTHS, PRESSURES, TREADS))
+    worn = TYRES["worn_summer"]
+    laws = [
+        STOPS_AT
+        * np.array(
+            [replace(worn, tread_depth=t).full_speed(x, LOAD, p=y) for t, x, y in zip(tread, h, p, strict=True)]
+        ),
+        np.array(
+            [gallaway_speed(x, y, tread_depth=t, texture_depth=TEXTURE) for t, x, y in zip(tread, h, p, strict=True)]
+        ),
+        usf_speed(h, p, LOAD),
+    ]
+    away = np.log(FULL_SPEEDS[:, None] / np.concatenate(laws)) / LAW_SD
+    found = np.exp(-0.5 * away * away).mean(axis=1)
+    return found / found.sum()
+
+
 def _text(x) -> str:
     if np.ndim(x) == 0:
         return f"{float(x):.4g}"
@@ -149,17 +177,14 @@ def fit(a: argparse.Namespace) -> None:
     found = np.load(a.source)["x"]
     found = found[np.isfinite(found[:, 5:]).all(axis=1)]
     out = [f"# Made by `python -m tests.margin.learn`; {len(found)} windows.", f"version = {VERSION}"]
-    inside = np.clip(np.log(FULL_SPEEDS / KMH / 60.0) / 0.1, -9.0, 0.0) + np.clip(
-        np.log(150.0 / (FULL_SPEEDS / KMH)) / 0.1, -9.0, 0.0
-    )
-    prior = np.exp(-0.5 * inside**2) / np.exp(-0.5 * inside**2).sum()
+    before = prior(np.random.default_rng(5))
     is_dry = found[:, 1] != -1.0
     for d, name in enumerate(DRIVETRAINS):
         some = (found[:, 0] == d) & ~is_dry
         mean, scatter, contact = water(found[some, 5:], found[some, 2], found[some, 4])
         m, S, share = dry(found[is_dry & (found[:, 0] == d), 5 : 5 + _N], np.random.default_rng(1))
         m = np.concatenate([m[..., None], np.zeros((KINDS, _N, COVARIATES - 1))], axis=2)
-        tables = Emissions(mean, scatter, contact, np.maximum(prior, 1e-6), m, S, share)
+        tables = Emissions(mean, scatter, contact, before, m, S, share)
         out.append(f"\n[{name}]")
         for field, x in tables._asdict().items():
             rows = x if x.ndim > 1 else [x]

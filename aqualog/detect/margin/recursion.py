@@ -159,16 +159,19 @@ def _judge(p, t, m, v, traction, w):  # type: ignore[no-untyped-def]
     """Let the window speak: probabilities of water and of the kinds of dry, evidence on the full speeds."""
     z = np.array([1.0, math.log(v / 30.0), math.asinh(traction / 0.02)])
     A, y = np.empty((_NX, _NX)), np.empty(_NX)
-    nodes = np.empty(_NN)
+    wide = m.x[1] + np.array([p.law_R**2, 0.0, 0.0, p.law_M**2, p.law_M**2])
+    score, far = np.empty(_NV), np.empty(_NV)
+    known, laws = np.empty(_NN), np.empty(_NN)
     for n in range(_NN):
-        nodes[n] = _score(t.mean[n], t.scatter[n], z, m.x[0], m.x[1], p.tail, A, y)
-    score = np.empty(_NV)
-    best = -1e300
+        known[n] = p.weight * _score(t.mean[n], t.scatter[n], z, m.x[0], m.x[1], p.tail, A, y)
+        laws[n] = p.weight * _score(t.mean[n], t.scatter[n], z, m.x[0], wide, p.tail, A, y)
+    best, most_far = -1e300, -1e300
     for i in range(_NV):
         place = min(max((_LOG[i] - math.log(v) - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
         n = int(place)
-        score[i] = p.weight * ((n + 1 - place) * nodes[n] + (place - n) * nodes[n + 1])
-        best = max(best, score[i])
+        score[i] = (n + 1 - place) * known[n] + (place - n) * known[n + 1]
+        far[i] = (n + 1 - place) * laws[n] + (place - n) * laws[n + 1]
+        best, most_far = max(best, score[i]), max(most_far, far[i])
     like = 0.0
     for i in range(_NV):
         like += w[i] * math.exp(score[i] - best)
@@ -188,7 +191,7 @@ def _judge(p, t, m, v, traction, w):  # type: ignore[no-untyped-def]
         m.dry[k] /= total
     keep = math.exp(-p.dt / p.keep_s)
     for i in range(_NV):
-        m.evidence[i] = keep * m.evidence[i] + score[i] - best
+        m.evidence[i] = keep * m.evidence[i] + far[i] - most_far
 
 
 @part

@@ -50,7 +50,9 @@ class FilterParams(NamedTuple):
     among_dry: float = 1.0 / 5.0
     start_water: float = 0.02  # probability of water at the start
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
-    weight: float = 0.2  # [-] of the evidence of a step: windows overlap, and tyre and road stay
+    weight: float = 0.15  # [-] of the evidence of a step: windows overlap, and tyre and road stay
+    law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
+    law_M: float = 3.0  # [-] the same of the log variances
     keep_s: float = 0.8  # [s] memory of the evidence on the full speed
     tail: float = 6.0  # degrees of freedom: how rare what was not drawn is
 
