@@ -65,9 +65,8 @@ def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
             continue
         front = _slip(row[_U_F + i], p.slope_f, p.rolling, p.friction)
         rear = _slip(row[_U_R + i], p.slope_r, p.rolling, p.friction)
-        both = p.share_axle * min(abs(front), abs(rear))
-        lasting = p.noise_D**2 + row[_VAR + i] + both * both
-        _learn_line(g, front - rear, row[_D + i] - g[0] - (1.0 + g[1]) * (front - rear), lasting, trust)
+        away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
+        _learn_line(g, front + rear, away, p.noise_D**2 + row[_VAR + i], trust)
 
 
 @part
@@ -98,10 +97,10 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
             row = m.window[k]
             if math.isnan(row[_D + i] + row[_U_F + i] + row[_U_R + i]):
                 continue
-            dry = _slip(row[_U_F + i], p.slope_f, p.rolling, p.friction)
-            dry -= _slip(row[_U_R + i], p.slope_r, p.rolling, p.friction)
-            away = row[_D + i] - g[0] - (1.0 + g[1]) * dry
-            n, e, e2, h, within = n + 1.0, e + away, e2 + away * away, h + dry, within + row[_VAR + i]
+            front = _slip(row[_U_F + i], p.slope_f, p.rolling, p.friction)
+            rear = _slip(row[_U_R + i], p.slope_r, p.rolling, p.friction)
+            away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
+            n, e, e2, h, within = n + 1.0, e + away, e2 + away * away, h + front + rear, within + row[_VAR + i]
         x[1 + i], P[1 + i], x[3 + i], P[3 + i] = 0.0, _UNKNOWN, 0.0, _UNKNOWN
         if n >= 3.0:
             e, h = e / n, h / n

@@ -32,12 +32,11 @@ class FilterParams(NamedTuple):
     scale_D: float = 5.0e-4  # [-] the same of a slip
     noise_R: float = 0.10  # [m/s^2] of a step
     noise_D: float = 4.0e-4  # [-] of a step, beside what its samples scatter
-    share_axle: float = 0.08  # [-] of what both axles slip alike: the file's slopes are not the tyres'
     noise_M: float = 1.0  # [-] of a log variance
     offset_R: float = 0.15  # [m/s^2] before anything is known
     share_a: float = 0.3  # [-] of the specific force: an unknown trailer or load
     offset_D: float = 5.0e-2  # [-] worn beside new tyres, a spare wheel
-    share_D: float = 0.15  # [-] of the slip of the drive
+    share_D: float = 0.15  # [-] of the slips of both axles: the file's slopes are not the tyres'
     shake: float = -14.0  # [-] log variance of a slip
     offset_M: float = 2.0  # [-]
     walk_R: float = 0.01  # [m/s^2 / sqrt(s)]
@@ -78,7 +77,8 @@ class Filter(NamedTuple):
     """State: evidence on the full speeds, what a dry road shows, and the steps of the window.
 
     `R` (5,): offset of the resistance [m/s²], its share of the specific force (an unknown load or trailer), covariance.
-    `sides` (2, 7): offset of the slip, share by which its slope is off, covariance, log variance and its variance.
+    `sides` (2, 7): offset of the slip, share of the axles' slips that it is off by, covariance, log variance and its
+    variance.
     """
 
     evidence: FloatArray  # (full speeds,) log
