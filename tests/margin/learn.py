@@ -21,7 +21,7 @@ from aqualog.detect.margin import emissions as kept
 from aqualog.detect.margin.emissions import COVARIATES, FEATURES, FULL_SPEEDS, NODES, VERSION, Emissions
 from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.recursion import scan
-from aqualog.detect.margin.state import Filter, Inputs
+from aqualog.detect.margin.state import Filter, FilterParams, Inputs
 from aqualog.detect.margin.watch import params
 from aqualog.features.stream import FeatureStream
 from aqualog.model.drawing import KMH, TUNING_POOL
@@ -38,8 +38,8 @@ TARGET = Path(kept.__file__).with_name("emissions.toml")
 DISTANCE = (-20.0 * KMH, 100.0 * KMH)
 _N = len(FEATURES)
 BANDWIDTH = 0.06  # [-] of the log ratio
-TAIL = 6.0  # as `FilterParams.tail`
-KINDS = 6
+TAIL = FilterParams._field_defaults["tail"]
+KINDS = 8
 DEPTHS, PRESSURES, TREADS = (0.6e-3, 6e-3), (1.8e5, 2.9e5), (1e-3, 8e-3)  # [m, Pa, m] that a prior is a mean over
 LOAD = np.array(4000.0)  # [N]
 TEXTURE = 0.8e-3  # [m] mean texture depth of asphalt
@@ -174,7 +174,7 @@ def _text(x) -> str:
 
 
 def fit(a: argparse.Namespace) -> None:
-    found = np.load(a.source)["x"]
+    found = np.concatenate([np.load(p)["x"] for p in a.source])
     found = found[np.isfinite(found[:, 5:]).all(axis=1)]
     out = [f"# Made by `python -m tests.margin.learn`; {len(found)} windows.", f"version = {VERSION}"]
     before = prior(np.random.default_rng(5))
@@ -201,7 +201,7 @@ def main() -> None:
     parser.add_argument("--passes", type=int, default=6000)
     parser.add_argument("--drives", type=int, default=20)
     parser.add_argument("--first", type=int, default=100_000)
-    parser.add_argument("--from", dest="source", type=Path, default=Path("/tmp/windows.npz"))
+    parser.add_argument("--from", dest="source", type=Path, nargs="+", default=[Path("/tmp/windows.npz")])
     parser.add_argument("--to", type=Path, default=Path("/tmp/windows.npz"))
     a = parser.parse_args()
     {"gather": gather, "fit": fit}[a.what](a)

@@ -51,7 +51,7 @@ class FilterParams(NamedTuple):
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
     weight: float = 0.15  # [-] of the evidence of a step: windows overlap, and tyre and road stay
     law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
-    law_M: float = 3.0  # [-] the same of the log variances
+    law_M: float = 2.0  # [-] the same of the log variances
     keep_s: float = 0.8  # [s] memory of the evidence on the full speed
     tail: float = 6.0  # degrees of freedom: how rare what was not drawn is
 
