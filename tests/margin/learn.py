@@ -39,7 +39,8 @@ DISTANCE = (-20.0 * KMH, 100.0 * KMH)
 _N = len(FEATURES)
 BANDWIDTH = 0.06  # [-] of the log ratio
 TAIL = FilterParams._field_defaults["tail"]
-KINDS = 8
+KINDS = 8  # of dry road, and as many of wet
+WET = 0.6  # [-] log ratio up to which water counts as such
 DEPTHS, PRESSURES, TREADS = (0.6e-3, 6e-3), (1.8e5, 2.9e5), (1e-3, 8e-3)  # [m, Pa, m] that a prior is a mean over
 LOAD = np.array(4000.0)  # [N]
 TEXTURE = 0.8e-3  # [m] mean texture depth of asphalt
@@ -47,8 +48,8 @@ STOPS_AT = 0.93  # a free wheel stops at about this share of the speed at which 
 LAW_SD = 0.20  # [-] log of a tyre's full speed about a law
 NEUTRAL = Emissions(
     np.zeros((NODES.size, _N, COVARIATES)), np.tile(1e9 * np.eye(_N), (NODES.size, 1, 1)), np.ones(NODES.size),
-    np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((1, _N, COVARIATES)), 1e9 * np.eye(_N)[None],
-    np.ones(1),
+    np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((2, _N, COVARIATES)), np.tile(1e9 * np.eye(_N), (2, 1, 1)),
+    np.ones(2), np.array([0.0, 1.0]),
 )  # fmt: skip
 
 
@@ -64,7 +65,7 @@ def windows(columns, vehicle, dt: float, wet):
     for k in range(f["v_x_hat"].size // p.block):
         at = slice(k * p.block, (k + 1) * p.block)
         is_wet = wet[0] - 0.1 <= k * p.dt < wet[1] + 1.0
-        state.water[0], state.dry[0] = (1.0, 0.0) if is_wet else (0.0, 1.0)
+        state.kinds[:] = (0.0, 1.0) if is_wet else (1.0, 0.0)
         _, state = scan(p, NEUTRAL, state, Inputs(*(x[at] for x in inputs)))
         traction = np.nanmean(np.nansum(state.window[:, 5:9], axis=1)) * 0.5
         v = state.window[int(state.samples[1] - 1) % 6, 0]
@@ -75,17 +76,20 @@ def windows(columns, vehicle, dt: float, wet):
 
 
 def gather(a: argparse.Namespace) -> None:
-    """Windows with drivetrain, kind (-1 water, else the number of the dry situation), log ratio, pass, contact."""
+    """Windows with drivetrain, kind, log ratio, pass, contact.
+
+    Kinds: -1 water, -3 its edge, -2 dry road before it, else the number of the dry situation.
+    """
     found = []
     for n in range(a.passes):
         p = own_pass(a.first + n, DRIVETRAINS[n % 3], distance=DISTANCE, broad=True)
         x = windows(p.columns, p.vehicle, p.dt, p.wet)
         d = n % 3
-        for after in (0.8, 1.4, 2.0, 2.6, 3.2, 3.7):
+        for after in (0.2, 0.3, 0.4, 0.5, 0.7, 0.8, 1.4, 2.0, 2.6, 3.2, 3.7):
             k = round((p.wet[0] + after) / 0.1)
             if k < len(x):
                 v = 30.0 * np.exp(x[k, 6])
-                found.append((d, -1.0, np.log(p.v_full / v), n, p.contact(v), *x[k]))
+                found.append((d, -1.0 if after > 0.7 else -3.0, np.log(p.v_full / v), n, p.contact(v), *x[k]))
         for k in range(40, round(p.wet[0] / 0.1) - 2, 20):
             found.append((d, -2.0, np.nan, n, np.nan, *x[k]))
         if n % 300 == 299:
@@ -126,8 +130,8 @@ def water(x, where, contact):
     return np.array(mean), np.array(scatter), np.array(share)
 
 
-def dry(x, rng):
-    """Means, covariances and shares of `KINDS` kinds of dry windows: a mixture of Student's laws."""
+def kinds(x, rng):
+    """Means, covariances and shares of `KINDS` kinds of windows: a mixture of Student's laws."""
     mean = x[rng.choice(len(x), KINDS, replace=False)]
     S = np.tile(np.cov(x.T), (KINDS, 1, 1))
     share = np.full(KINDS, 1.0 / KINDS)
@@ -178,19 +182,23 @@ def fit(a: argparse.Namespace) -> None:
     found = found[np.isfinite(found[:, 5:]).all(axis=1)]
     out = [f"# Made by `python -m tests.margin.learn`; {len(found)} windows.", f"version = {VERSION}"]
     before = prior(np.random.default_rng(5))
-    is_dry = found[:, 1] != -1.0
+    which, features = found[:, 1], found[:, 5 : 5 + _N]
     for d, name in enumerate(DRIVETRAINS):
-        some = (found[:, 0] == d) & ~is_dry
-        mean, scatter, contact = water(found[some, 5:], found[some, 2], found[some, 4])
-        m, S, share = dry(found[is_dry & (found[:, 0] == d), 5 : 5 + _N], np.random.default_rng(1))
-        m = np.concatenate([m[..., None], np.zeros((KINDS, _N, COVARIATES - 1))], axis=2)
-        tables = Emissions(mean, scatter, contact, before, m, S, share)
+        own = found[:, 0] == d
+        at = own & (which == -1.0)
+        laws = water(found[at, 5:], found[at, 2], found[at, 4])
+        rng = np.random.default_rng(1)
+        wet = own & ((which == -1.0) | (which == -3.0)) & (found[:, 2] < WET)
+        roads = [kinds(features[some], rng) for some in (own & ((which == -2.0) | (which >= 0.0)), wet)]
+        m, S, share = (np.concatenate(x) for x in zip(*roads, strict=True))
+        m = np.concatenate([m[..., None], np.zeros((*m.shape, COVARIATES - 1))], axis=2)
+        tables = Emissions(*laws, before, m, S, share, np.repeat([0.0, 1.0], KINDS))
         out.append(f"\n[{name}]")
         for field, x in tables._asdict().items():
             rows = x if x.ndim > 1 else [x]
             body = ",\n".join(_text(r) for r in rows)
             out.append(f"{field} = [\n{body},\n]" if x.ndim > 1 else f"{field} = {body}")
-        print(name, some.sum(), "windows; kinds of dry", np.round(share, 3))
+        print(name, at.sum(), "windows of water; kinds of road", np.round(share, 3))
         print(np.round(m[..., 0], 2), np.round(np.sqrt(np.einsum("kii->ki", S)), 2), sep="\n")
     TARGET.write_text("\n".join(out) + "\n", encoding="utf-8")
 

@@ -31,18 +31,20 @@ VERSION = 1
 
 
 class Emissions(NamedTuple):
-    """Mean by covariates (nodes, features, covariates) and covariance (nodes, features, features); the same of dry.
+    """Mean by covariates (nodes, features, covariates) and covariance (nodes, features, features) at each distance.
 
-    `contact` (nodes,) [-] of the front axle; `prior` (full speeds,); `dry_prior` (kinds,) of kinds of dry drives.
+    `contact` (nodes,) [-] of the front axle; `prior` (full speeds,). `kind_` the same of kinds of road, dry and wet:
+    their shares sum to 1 among the dry and among the wet; `is_wet` 0 or 1.
     """
 
     mean: FloatArray
     scatter: FloatArray
     contact: FloatArray
     prior: FloatArray
-    dry_mean: FloatArray
-    dry_scatter: FloatArray
-    dry_prior: FloatArray
+    kind_mean: FloatArray
+    kind_scatter: FloatArray
+    kind_prior: FloatArray
+    is_wet: FloatArray
 
 
 @lru_cache(maxsize=1)

@@ -138,6 +138,22 @@ def _score(mean, scatter, z, x, P, tail, A, y):  # type: ignore[no-untyped-def]
 
 
 @part
+def _place(v, i):  # type: ignore[no-untyped-def]
+    """Node below a cell of the full speed, and how far it is on the way to the next."""
+    place = min(max((_LOG[i] - math.log(v) - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
+    n = int(place)
+    return n, place - n
+
+
+@part
+def _wet(t, m):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for k in range(m.kinds.size):
+        total += t.is_wet[k] * m.kinds[k]
+    return total
+
+
+@part
 def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
     """Fill the probabilities of the full speeds, given that there is water."""
     best = -1e300
@@ -154,74 +170,64 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
 
 
 @part
-def _judge(p, t, m, v, traction, w):  # type: ignore[no-untyped-def]
-    """Let the window speak: probabilities of water and of the kinds of dry, evidence on the full speeds."""
+def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
+    """Let the window speak: probabilities of the kinds of dry and wet road, evidence on the full speeds."""
     z = np.array([1.0, math.log(v / 30.0), math.asinh(traction / 0.02)])
     A, y = np.empty((_NX, _NX)), np.empty(_NX)
-    wide = m.x[1] + np.array([p.law_R**2, 0.0, 0.0, p.law_M**2, p.law_M**2])
-    score, far = np.empty(_NV), np.empty(_NV)
-    known, laws = np.empty(_NN), np.empty(_NN)
+    score = np.empty(m.kinds.size)
+    best = -1e300
+    for k in range(score.size):
+        score[k] = p.weight * _score(t.kind_mean[k], t.kind_scatter[k], z, m.x[0], m.x[1], p.tail, A, y)
+        best = max(best, score[k])
+    total = 0.0
+    for k in range(score.size):
+        m.kinds[k] *= math.exp(score[k] - best)
+        total += m.kinds[k]
+    for k in range(score.size):
+        m.kinds[k] /= total
+    # how much drag and shake belong to a distance differs from law to law more than what is learnt
+    P = m.x[1] + np.array([p.law_R**2, 0.0, 0.0, p.law_M**2, p.law_M**2])
+    nodes = np.empty(_NN)
     for n in range(_NN):
-        known[n] = p.weight * _score(t.mean[n], t.scatter[n], z, m.x[0], m.x[1], p.tail, A, y)
-        laws[n] = p.weight * _score(t.mean[n], t.scatter[n], z, m.x[0], wide, p.tail, A, y)
-    best, most_far = -1e300, -1e300
-    for i in range(_NV):
-        place = min(max((_LOG[i] - math.log(v) - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
-        n = int(place)
-        score[i] = (n + 1 - place) * known[n] + (place - n) * known[n + 1]
-        far[i] = (n + 1 - place) * laws[n] + (place - n) * laws[n + 1]
-        best, most_far = max(best, score[i]), max(most_far, far[i])
-    like = 0.0
-    for i in range(_NV):
-        like += w[i] * math.exp(score[i] - best)
-    kinds = t.dry_prior.size
-    dry = np.empty(kinds)
-    most = best
-    for k in range(kinds):
-        dry[k] = p.weight * _score(t.dry_mean[k], t.dry_scatter[k], z, m.x[0], m.x[1], p.tail, A, y)
-        most = max(most, dry[k])
-    m.water[0] *= like * math.exp(best - most)
-    total = m.water[0]
-    for k in range(kinds):
-        m.dry[k] *= math.exp(dry[k] - most)
-        total += m.dry[k]
-    m.water[0] /= total
-    for k in range(kinds):
-        m.dry[k] /= total
+        nodes[n] = p.weight * _score(t.mean[n], t.scatter[n], z, m.x[0], P, p.tail, A, y)
     keep = math.exp(-p.dt / p.keep_s)
     for i in range(_NV):
-        m.evidence[i] = keep * m.evidence[i] + far[i] - most_far
+        n, a = _place(v, i)
+        m.evidence[i] = keep * m.evidence[i] + (1.0 - a) * nodes[n] + a * nodes[n + 1]
 
 
 @part
 def _predict(p, t, m):  # type: ignore[no-untyped-def]
-    """Let the hypotheses change into each other over one step."""
-    was_dry = 1.0 - m.water[0]
-    into, out = p.to_water * p.dt * was_dry, p.to_dry * p.dt * m.water[0]
-    m.water[0] += into - out
-    change = p.among_dry * p.dt
-    for k in range(m.dry.size):
-        m.dry[k] = m.dry[k] * (1.0 - change - p.to_water * p.dt) + (change * was_dry + out) * t.dry_prior[k]
+    """Let the kinds change into each other over one step."""
+    wet = _wet(t, m)
+    change = p.among * p.dt
+    into, out = p.to_water * p.dt * (1.0 - wet), p.to_dry * p.dt * wet
+    for k in range(m.kinds.size):
+        if t.is_wet[k] > 0.0:
+            m.kinds[k] *= 1.0 - change - p.to_dry * p.dt
+            m.kinds[k] += t.kind_prior[k] * (change * wet + into)
+        else:
+            m.kinds[k] *= 1.0 - change - p.to_water * p.dt
+            m.kinds[k] += t.kind_prior[k] * (change * (1.0 - wet) + out)
 
 
 @part
-def _fill(p, t, m, v, w):  # type: ignore[no-untyped-def]
+def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
     """Fill what is put out."""
-    m.out[0] = m.water[0]
+    m.out[0] = wet
     near, total, q, L = 0.0, 0.0, 0, 0.0
     edge = _LOG[0] - 0.5 * LOG_STEP
     limit = math.log(v + p.near)
     for i in range(_NV):
         near += w[i] * min(max((limit - edge) / LOG_STEP, 0.0), 1.0)
-        place = min(max((_LOG[i] - math.log(v) - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
-        n = int(place)
-        L += w[i] * ((n + 1 - place) * t.contact[n] + (place - n) * t.contact[n + 1])
+        n, a = _place(v, i)
+        L += w[i] * ((1.0 - a) * t.contact[n] + a * t.contact[n + 1])
         while q < 5 and total + w[i] >= _QUANTILES[q] and w[i] > 0.0:
             m.out[2 + q] = math.exp(edge + LOG_STEP * (_QUANTILES[q] - total) / w[i]) - v
             q += 1
         total += w[i]
         edge += LOG_STEP
-    m.out[1] = near * m.water[0]
+    m.out[1] = near * wet
     m.out[7] = L
     m.out[8] = m.out[4] + v
 
@@ -232,7 +238,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     at = int(m.samples[1]) % ROWS
     m.samples[1] += 1.0
     v = row[_V]
-    dry = 1.0 - m.water[0]
+    dry = 1.0 - _wet(t, m)
     old = m.window[at]
     if not math.isnan(old[_V]):
         # slower, a road counts as dry whatever lies on it
@@ -248,18 +254,18 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
         for a in (1, 3):
             x[a], x[a + 1] = x[a + 1], x[a]
             P[a], P[a + 1] = P[a + 1], P[a]
-    _weights(p, t, m, speed, w)
     if v > p.v_least:
-        _judge(p, t, m, speed, traction, w)
-        _weights(p, t, m, speed, w)
+        _judge(p, t, m, speed, traction)
+    _weights(p, t, m, speed, w)
+    wet = _wet(t, m)
     for i in range(2):
         g = m.sides[i]
         g[6] = min(g[6] + p.walk_M**2 * p.dt, p.offset_M**2)
         if known[i]:
-            gain = (1.0 - m.water[0]) * g[6] / (g[6] + p.noise_M**2)
+            gain = (1.0 - wet) * g[6] / (g[6] + p.noise_M**2)
             g[5] += gain * own[i]
             g[6] *= 1.0 - gain
-    _fill(p, t, m, speed, w)
+    _fill(p, t, m, speed, w, wet)
 
 
 @compiled

@@ -46,7 +46,7 @@ class FilterParams(NamedTuple):
     walk_M: float = 0.03  # [1 / sqrt(s)]
     to_water: float = 1.0 / 300.0  # [1/s]
     to_dry: float = 1.0 / 10.0
-    among_dry: float = 1.0 / 5.0
+    among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
     start_water: float = 0.02  # probability of water at the start
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
     weight: float = 0.15  # [-] of the evidence of a step: windows overlap, and tyre and road stay
@@ -82,8 +82,7 @@ class Filter(NamedTuple):
     """
 
     evidence: FloatArray  # (full speeds,) log
-    water: FloatArray  # (1,) probability
-    dry: FloatArray  # (kinds,) probabilities
+    kinds: FloatArray  # (kinds,) probabilities of kinds of dry and wet road
     R: FloatArray
     sides: FloatArray
     window: FloatArray  # (ROWS, COLUMNS)
@@ -98,8 +97,7 @@ class Filter(NamedTuple):
         side = np.array([0.0, 0.0, p.offset_D**2, 0.0, p.share_D**2, p.shake, p.offset_M**2])
         return Filter(
             evidence=np.zeros(FULL_SPEEDS.size),
-            water=np.array([p.start_water]),
-            dry=(1.0 - p.start_water) * t.dry_prior,
+            kinds=t.kind_prior * np.where(t.is_wet > 0.0, p.start_water, 1.0 - p.start_water),
             R=np.array([0.0, 0.0, p.offset_R**2, 0.0, p.share_a**2]),
             sides=np.stack([side, side]),
             window=np.full((ROWS, COLUMNS), np.nan),
