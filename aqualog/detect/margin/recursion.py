@@ -177,7 +177,7 @@ def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
     score = np.empty(m.kinds.size)
     best = -1e300
     for k in range(score.size):
-        score[k] = p.weight * _score(t.kind_mean[k], t.kind_scatter[k], z, m.x[0], m.x[1], p.tail, A, y)
+        score[k] = p.weight_road * _score(t.kind_mean[k], t.kind_scatter[k], z, m.x[0], m.x[1], p.tail, A, y)
         best = max(best, score[k])
     total = 0.0
     for k in range(score.size):
@@ -189,7 +189,7 @@ def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
     P = m.x[1] + np.array([p.law_R**2, 0.0, 0.0, p.law_M**2, p.law_M**2])
     nodes = np.empty(_NN)
     for n in range(_NN):
-        nodes[n] = p.weight * _score(t.mean[n], t.scatter[n], z, m.x[0], P, p.tail, A, y)
+        nodes[n] = p.weight_full * _score(t.mean[n], t.scatter[n], z, m.x[0], P, p.tail, A, y)
     keep = math.exp(-p.dt / p.keep_s)
     for i in range(_NV):
         n, a = _place(v, i)
@@ -227,7 +227,8 @@ def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
             q += 1
         total += w[i]
         edge += LOG_STEP
-    m.out[1] = near * wet
+    # without a slip the distance is what was assumed before: no reason to warn
+    m.out[1] = near * wet if m.x[1, 1] < _UNKNOWN else 0.0
     m.out[7] = L
     m.out[8] = m.out[4] + v
 

@@ -49,7 +49,8 @@ class FilterParams(NamedTuple):
     among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
     start_water: float = 0.02  # probability of water at the start
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
-    weight: float = 0.15  # [-] of the evidence of a step: windows overlap, and tyre and road stay
+    weight_road: float = 0.15  # [-] of a step's evidence on water: windows overlap, and tyre and road stay
+    weight_full: float = 0.12  # the same on the full speed
     law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
     law_M: float = 2.0  # [-] the same of the log variances
     keep_s: float = 0.8  # [s] memory of the evidence on the full speed
