@@ -46,12 +46,6 @@ class Pass:
     depth: float
     note: str
     dt: float = DT
-    contact_exponent: float = float("nan")
-    v_end: float = float("nan")
-
-    def contact(self, v: float) -> float:
-        """Contact share of the front axle at a speed [m/s], of the project's simulator. [-]"""
-        return max(1.0 - (v / self.v_end) ** self.contact_exponent, 0.0)
 
 
 def first_stop(friction: np.ndarray, torque: np.ndarray) -> float:
@@ -132,10 +126,8 @@ def own_pass(
     on = np.flatnonzero(film > 0.0) * signals.dt_ns * 1e-9
     columns = {s: signals.array(s) for s in signals.symbols}
     note = f"{seed} {car.name}, tread {1e3 * tread:.1f} mm, {1e3 * depth:.1f} mm, {1e-5 * p:.1f} bar"
-    load = np.array(0.5 * car.mass * G * car.l_r / car.wheelbase)
-    end = float(tyre.full_speed(np.array(depth), load, p=p))
     return Pass(columns, believed, full, (float(on[0]), float(on[-1])), car.drivetrain, depth, note,
-                signals.dt_ns * 1e-9, tyre.contact_exponent, end)  # fmt: skip
+                signals.dt_ns * 1e-9)  # fmt: skip
 
 
 def foreign_full(car, depth: float) -> float:

@@ -1,23 +1,16 @@
-"""How well the distance to full aquaplaning holds: passes with a known distance, dry drives, measured drives.
+"""How well the distance to full aquaplaning holds: passes with a known distance, and dry drives.
 
-    python -m tests.margin.study --passes 4000 --first 20000
-    python -m tests.margin.study --foreign --passes 1000 --first 20000     # tests.blind.multibody: other laws
-    python -m tests.margin.study --passes 300 --first 20000 --without v_x,torque_fl,torque_fr,torque_rl,torque_rr
-    python -m tests.margin.study --dry-hours 10 --first 20000              # false warnings of simulated dry drives
-    python -m tests.margin.study --real                                    # and of measured ones
-
-The limit of information is a local Gaussian estimate: slope of the features over the distance and their scatter over
-cars, tyres, water and sensors within 10 km/h, by drivetrain. It is no strict bound.
+python -m tests.margin.study --passes 4000 --first 20000
+python -m tests.margin.study --foreign --passes 1000 --first 20000     # tests.blind.multibody: other laws
+python -m tests.margin.study --passes 300 --first 20000 --without v_x,torque_fl,torque_fr,torque_rl,torque_rr
+python -m tests.margin.study --dry-hours 10 --first 20000              # false warnings of simulated dry drives
 """
 
 from __future__ import annotations
 
 import argparse
-import os
-import pickle
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,13 +26,11 @@ from tests.margin.passes import Pass, foreign_pass, own_pass
 KMH = 3.6
 CELLS = ((-8, 5), (5, 15), (15, 25), (25, 35), (35, 45), (45, 55))  # [km/h]
 DRIVETRAINS = ("rwd", "fwd", "awd")
-HERE = Path(__file__).parents[1] / "real"
-REAL = Path(os.environ.get("AQUALOG_REAL_LOGS", Path(__file__).parents[3] / "shared" / "real_logs"))
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """One pass, `after` seconds behind the edge of the water: distances in km/h, features for the limit."""
+    """One pass, `after` seconds behind the edge of the water: distances in km/h."""
 
     drivetrain: str
     true: float
@@ -50,8 +41,6 @@ class Outcome:
     q75: float
     is_warned: bool
     is_early: bool
-    features: tuple[float, ...]
-    note: str = field(compare=False, default="")
 
 
 def watched(p: Pass, drop: Sequence[str] = ()):
@@ -68,37 +57,8 @@ def outcome(p: Pass, after: float, drop: Sequence[str] = ()) -> Outcome:
     edge, k = int(p.wet[0] / p.dt), int((p.wet[0] + after) / p.dt)
     names = ("aquaplaning_margin", *(f"aquaplaning_margin_{n}" for n in ("low", "high", "q25", "q75")))
     found = (float(f[n][k]) * KMH for n in names)
-    before, wet = slice(max(edge - 400, 0), edge - 20), slice(edge + 50, k)
-
-    def change(x) -> float:
-        with np.errstate(invalid="ignore"):
-            return float(np.nanmean(x[wet]) - np.nanmean(x[before]))
-
-    v = f["v_x_hat"]
-    sides = [(f[f"v_line_f{s}"] - f[f"v_line_r{s}"]) / v for s in "lr"]
-    slips = [np.arcsinh(change(x) / 5e-4) for x in sides]
-    shake = [float(np.log(np.nanstd(x[wet]) + 1e-5)) for x in sides]
-    force = change(f["delta_a_x"]) if "delta_a_x" in f else 0.0
     warned, early = bool(active[edge : edge + 200].any()), bool(active[: edge - 20].any())
-    true = float(p.v_full - v[k]) * KMH
-    return Outcome(p.drivetrain, true, *found, warned, early, (force, *slips, *shake), p.note)
-
-
-def limit(outcomes: Sequence[Outcome], low: float, high: float) -> float:
-    """Standard deviation of the distance that the features allow in a cell [km/h]; NaN with too few passes."""
-    middle, sds = 0.5 * (low + high), []
-    for drivetrain in DRIVETRAINS:
-        near = [o for o in outcomes if o.drivetrain == drivetrain and abs(o.true - middle) < 10.0]
-        x = np.array([o.features for o in near])
-        if len(near) < 25 or not np.isfinite(x).all():
-            continue
-        d = np.array([o.true for o in near]) - middle
-        form = np.stack([np.ones_like(d), d], axis=1)
-        fit, *_ = np.linalg.lstsq(form, x, rcond=None)
-        left = x - form @ fit
-        scatter = left.T @ left / (len(near) - 2) + 1e-9 * np.eye(x.shape[1])
-        sds.append(float(fit[1] @ np.linalg.solve(scatter, fit[1])) ** -0.5)
-    return float(np.mean(sds)) if sds else float("nan")
+    return Outcome(p.drivetrain, float(p.v_full - f["v_x_hat"][k]) * KMH, *found, warned, early)
 
 
 def lines(outcomes: Sequence[Outcome], title: str) -> Iterator[str]:
@@ -116,7 +76,7 @@ def lines(outcomes: Sequence[Outcome], title: str) -> Iterator[str]:
         yield (
             f"  {low:3d} to {high:2d} km/h: n {len(cell):4d}, distance given {has.mean():.2f}; median error "
             f"{np.median(np.abs(away)):4.1f}, bias {np.median(away):+5.1f}, 90 % holds {in90:.2f}, 50 % holds {in50:.2f}, "
-            f"half width {0.5 * np.median(x[has, 3] - x[has, 2]):4.1f}; limit sd {limit(outcomes, low, high):4.1f}; "
+            f"half width {0.5 * np.median(x[has, 3] - x[has, 2]):4.1f}; "
             f"warned {np.mean([o.is_warned for o in cell]):.2f}"
         )
 
@@ -136,10 +96,8 @@ def recall_to(outcomes: Sequence[Outcome]) -> float:
 def study(a: argparse.Namespace) -> None:
     make, drop = foreign_pass if a.foreign else own_pass, tuple(a.without.split(",")) if a.without else ()
     outcomes: list[Outcome] = []
-    kept = list(pickle.loads(a.passes_in.read_bytes())) if a.passes_in else None  # of this command alone
-    for n in range(len(kept) if kept else a.passes):
-        p = kept[n] if kept else make(a.first + n, DRIVETRAINS[n % 3])
-        outcomes.append(outcome(p, a.after, drop))
+    for n in range(a.passes):
+        outcomes.append(outcome(make(a.first + n, DRIVETRAINS[n % 3]), a.after, drop))
         if (n + 1) % 500 == 0:
             print(f"{n + 1} passes", flush=True)
     print("\n".join(lines(outcomes, "foreign" if a.foreign else "own")))
@@ -178,29 +136,6 @@ def dry(a: argparse.Namespace) -> None:
     print(f"{seconds / 3600.0:.2f} h dry, seeds {a.first} to {seed - 1}: {found} false warnings {by}")
 
 
-def real() -> None:
-    """Warnings on the measured dry drives that have wheel speeds."""
-    from aqualog.align.load import load_signals
-    from aqualog.config.signal_map import load_signal_map
-    from aqualog.config.vehicle import load_vehicle
-
-    for name, files, dbc in (
-        ("toyota", ("toyota_rav4/can_bus.mf4",), ("toyota_rav4/toyota_2017.dbc",)),
-        *(("bmw_i3", (f"bmw_i3/{p.name}",), ()) for p in sorted((REAL / "bmw_i3").glob("*.csv"))),
-    ):
-        car = HERE / f"{name}.toml"
-        if not car.exists():
-            continue
-        vehicle = load_vehicle(car)
-        signals = load_signals(
-            [REAL / f for f in files], vehicle=vehicle, signal_map=load_signal_map(HERE / f"{name}_map.toml"),
-            dbc=[REAL / f for f in dbc],
-        )  # fmt: skip
-        lacks = MARGIN.needs(vehicle, signals.symbols, 1e9 / signals.dt_ns).missing
-        print(*files, f"{signals.duration_s:.0f} s", f"lacks {', '.join(lacks)}" if lacks else "",
-              warnings_in(signals, vehicle), flush=True)  # fmt: skip
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--passes", type=int, default=0)
@@ -209,17 +144,13 @@ def main() -> None:
     parser.add_argument("--after", type=float, default=2.0, help="seconds behind the edge of the water")
     parser.add_argument("--without", default="", help="signals that the logs lack")
     parser.add_argument("--by-drivetrain", action="store_true")
-    parser.add_argument("--passes-in", type=Path, help="a pickle of passes instead of new ones")
     parser.add_argument("--dry-hours", type=float, default=0.0)
     parser.add_argument("--situations", default="")
-    parser.add_argument("--real", action="store_true")
     a = parser.parse_args()
-    if a.passes or a.passes_in:
+    if a.passes:
         study(a)
     if a.dry_hours:
         dry(a)
-    if a.real:
-        real()
 
 
 if __name__ == "__main__":

@@ -1,13 +1,11 @@
 """The distance to full aquaplaning: it falls with speed, warns before it, and stays silent on dry roads."""
 
-from dataclasses import replace
-
 import numpy as np
-import polars as pl
 import pytest
 
 from aqualog.detect.detector import Settings
-from aqualog.detect.margin.emissions import FEATURES, NODES, emissions_of
+from aqualog.detect.margin.emissions import emissions_of
+from aqualog.detect.margin.state import FEATURES, NODES
 from aqualog.detect.margin.watch import Least
 from aqualog.detect.stream import detect_drive
 from aqualog.report.drive.document import document
@@ -109,13 +107,15 @@ def test_rain_from_the_first_metre():
     assert np.isfinite(found.margin.warned_s)
 
 
-def test_a_wheel_that_stands_still_in_the_log_is_no_water():
-    columns = drive(CAR, duration_s=30.0, lanes=(), speed_kmh=((0.0, 110.0), (14.0, 110.0), (26.0, 90.0)))[0]
-    x = columns.array("omega_fr").copy()
-    x[1600:2300] = x[1600]
-    held = columns.frame.with_columns(pl.Series("omega_fr", x))
-    result = detect_drive(replace(columns, frame=held), CAR, settings=WARNS)
-    assert not [e for e in result.events if e.detector == "margin"]
+def test_a_wheel_signal_that_stands_still_is_none():
+    p = own_pass(7, "fwd")
+    held = {**p.columns, "omega_fr": p.columns["omega_fr"].copy()}
+    held["omega_fr"][500:700] = held["omega_fr"][500]
+    whole, part = (windows(x, p.vehicle, p.dt, p.wet)[:, 1] for x in (p.columns, held))
+    gone = slice(round(6.1 / 0.1), round(6.9 / 0.1))
+    assert np.isfinite(whole[gone]).all()
+    assert np.isnan(part[gone]).all()
+    assert np.isfinite(part[round(7.6 / 0.1) : 80]).all()
 
 
 def test_without_torque_it_does_not_run():

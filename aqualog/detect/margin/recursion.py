@@ -12,8 +12,18 @@ import numpy as np
 
 from aqualog.core.compiled import compiled, part
 from aqualog.core.records import FloatArray
-from aqualog.detect.margin.emissions import COVARIATES, FEATURES, FULL_SPEEDS, LOG_STEP, NODES, Emissions
-from aqualog.detect.margin.state import ROWS, Filter, FilterParams, Inputs
+from aqualog.detect.margin.state import (
+    COVARIATES,
+    FEATURES,
+    FULL_SPEEDS,
+    LOG_STEP,
+    NODES,
+    ROWS,
+    Emissions,
+    Filter,
+    FilterParams,
+    Inputs,
+)  # fmt: skip
 
 __all__ = ["scan"]
 
@@ -177,7 +187,7 @@ def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
     score = np.empty(m.kinds.size)
     best = -1e300
     for k in range(score.size):
-        score[k] = p.weight_road * _score(t.kind_mean[k], t.kind_scatter[k], z, m.x[0], m.x[1], p.tail, A, y)
+        score[k] = p.weight * _score(t.kind_mean[k], t.kind_scatter[k], z, m.x[0], m.x[1], p.tail, A, y)
         best = max(best, score[k])
     total = 0.0
     for k in range(score.size):
@@ -189,7 +199,7 @@ def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
     P = m.x[1] + np.array([p.law_R**2, 0.0, 0.0, p.law_M**2, p.law_M**2])
     nodes = np.empty(_NN)
     for n in range(_NN):
-        nodes[n] = p.weight_full * _score(t.mean[n], t.scatter[n], z, m.x[0], P, p.tail, A, y)
+        nodes[n] = p.weight * _score(t.mean[n], t.scatter[n], z, m.x[0], P, p.tail, A, y)
     keep = math.exp(-p.dt / p.keep_s)
     for i in range(_NV):
         n, a = _place(v, i)

@@ -1,4 +1,4 @@
-"""Tuning, inputs and state of the filter of the distance to full aquaplaning."""
+"""Features, tuning, inputs, learnt tables and state of the filter of the distance to full aquaplaning."""
 
 from __future__ import annotations
 
@@ -7,9 +7,21 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.detect.margin.emissions import FEATURES, FULL_SPEEDS, Emissions
 
-__all__ = ["COLUMNS", "OUTPUTS", "ROWS", "Filter", "FilterParams", "Inputs"]
+__all__ = [
+    "COLUMNS", "COVARIATES", "FEATURES", "FULL_SPEEDS", "LOG_STEP", "NODES", "OUTPUTS", "ROWS", "Emissions", "Filter",
+    "FilterParams", "Inputs",
+]  # fmt: skip
+
+LOG_STEP = 0.05
+FULL_SPEEDS: FloatArray = 40.0 / 3.6 * np.exp(LOG_STEP * np.arange(34, dtype=np.float64))
+"""Cells of the speed of full aquaplaning, 40 to 208 km/h. [m/s]"""
+NODES: FloatArray = LOG_STEP * np.arange(-5.0, 17.0)
+"""Log of the speed of full aquaplaning over the car's, for which the emissions are known. [-]"""
+FEATURES = ("resistance", "slip_more", "slip_less", "shake_more", "shake_less")
+"""Of 0.6 s, less what the same car showed on dry road: resistance, slip of the front axle less that of the rear on the
+side that deviates more and on the other one, log variance of both. [-]"""
+COVARIATES = 3  # 1, log of the speed, traction
 
 OUTPUTS = ("p_water", "p_near", "low", "q25", "median", "q75", "high", "contact", "v_full")
 """Rows of what a scan returns: probabilities [-], quantiles of the distance [m/s], contact share [-], speed [m/s]."""
@@ -49,8 +61,7 @@ class FilterParams(NamedTuple):
     among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
     start_water: float = 0.02  # probability of water at the start
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
-    weight_road: float = 0.15  # [-] of a step's evidence on water: windows overlap, and tyre and road stay
-    weight_full: float = 0.12  # the same on the full speed
+    weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay
     law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
     law_M: float = 2.0  # [-] the same of the log variances
     keep_s: float = 0.8  # [s] memory of the evidence on the full speed
@@ -72,6 +83,23 @@ class Inputs(NamedTuple):
     u_fr: FloatArray
     u_rl: FloatArray
     u_rr: FloatArray
+
+
+class Emissions(NamedTuple):
+    """Mean by covariates (nodes, features, covariates) and covariance (nodes, features, features) at each distance.
+
+    `contact` (nodes,) [-] of the front axle; `prior` (full speeds,). `kind_` the same of kinds of road, dry and wet:
+    their shares sum to 1 among the dry and among the wet; `is_wet` 0 or 1.
+    """
+
+    mean: FloatArray
+    scatter: FloatArray
+    contact: FloatArray
+    prior: FloatArray
+    kind_mean: FloatArray
+    kind_scatter: FloatArray
+    kind_prior: FloatArray
+    is_wet: FloatArray
 
 
 class Filter(NamedTuple):
