@@ -125,9 +125,8 @@ def learn(found):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--passes", type=int, default=3600)
-    parser.add_argument("--drives", type=int, default=24)
-    parser.add_argument("--first", type=int, default=100_000)
+    for name, default in (("passes", 3600), ("drives", 24), ("first", 100_000)):
+        parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--keep", type=Path, default=Path("windows.npz"), help="file of windows, taken where it exists")
     a = parser.parse_args()
     if not a.keep.exists():

@@ -5,13 +5,13 @@ import pytest
 
 from aqualog.detect.detector import Settings
 from aqualog.detect.margin.emissions import emissions_of
-from aqualog.detect.margin.state import FEATURES, NODES
+from aqualog.detect.margin.state import NODES
 from aqualog.detect.margin.watch import Least
 from aqualog.detect.stream import detect_drive
 from aqualog.report.drive.document import document
 from aqualog.report.drive.panels import drive_rows
 from tests.drives import CAR, drive, lane
-from tests.margin.learn import windows
+from tests.margin.learn import DRIVETRAINS, windows
 from tests.margin.passes import own_pass
 
 KMH = 3.6
@@ -25,32 +25,23 @@ def wet():
     return detect_drive(columns, CAR, settings=WARNS)
 
 
-@pytest.fixture(scope="module", params=["rwd", "fwd", "awd"])
-def learnt(request):
-    return request.param, emissions_of(request.param)
-
-
-def test_emissions_are_a_law(learnt):
+@pytest.mark.parametrize("drivetrain", DRIVETRAINS)
+def test_emissions_are_a_law(drivetrain):
     """Towards full aquaplaning contact falls, resistance grows and wheels shake; scatters are covariances."""
-    _, t = learnt
+    t = emissions_of(drivetrain)
     assert (np.diff(t.contact) > 0.0).all()
     at = t.mean @ np.array([1.0, 0.0, np.arcsinh(1.5)])  # 108 km/h, a steady car
     near, far = (int(np.argmin(np.abs(NODES - x))) for x in (0.1, 0.5))
-    for name in ("resistance", "shake_more", "shake_less"):
-        assert at[near, FEATURES.index(name)] > at[far, FEATURES.index(name)] + 0.1
-    slip = np.abs(at[:, FEATURES.index("slip_more")])
-    assert slip[near] > slip[far] + 0.5
-    for S in (*t.scatter, *t.kind_scatter):
-        assert (np.linalg.eigvalsh(S) > 0.0).all()
-    assert t.prior.sum() == pytest.approx(1.0, abs=1e-3)
-    for road in (0.0, 1.0):
-        assert t.kind_prior[t.is_wet == road].sum() == pytest.approx(1.0, abs=1e-3)
+    assert (np.abs(at[near]) > np.abs(at[far]) + 0.1).all()
+    assert (np.linalg.eigvalsh(np.concatenate([t.scatter, t.kind_scatter])) > 0.0).all()
+    shares = [t.prior.sum(), *(t.kind_prior[t.is_wet == road].sum() for road in (0.0, 1.0))]
+    assert shares == pytest.approx([1.0, 1.0, 1.0], abs=1e-3)
 
 
-def test_emissions_are_those_of_these_features(learnt):
+@pytest.mark.parametrize("drivetrain", DRIVETRAINS)
+def test_emissions_are_those_of_these_features(drivetrain):
     """Features of passes that were not learnt from lie where the file has them; another scale or order would not."""
-    drivetrain, t = learnt
-    squares = []
+    t, squares = emissions_of(drivetrain), []
     for seed in range(12):
         p = own_pass(300 + seed, drivetrain)
         x = windows(p.columns, p.vehicle, p.dt, p.wet)[round((p.wet[0] + 2.0) / 0.1)]
