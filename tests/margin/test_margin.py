@@ -129,7 +129,7 @@ def test_the_least_of_pieces_is_that_of_the_whole():
 
 
 def test_nobody_gets_it_who_has_not_asked_for_it():
-    """It is on trial: rough asphalt warns too, and it costs more than all other detectors together."""
+    """It is on trial: a car whose tyres follow other laws may be further from full aquaplaning than it says."""
     columns = drive(CAR, duration_s=14.0, lanes=(lane(),), speed_kmh=((0.0, 104.0),))[0]
     quiet = detect_drive(columns, CAR)
     assert quiet.margin is None
