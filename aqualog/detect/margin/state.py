@@ -18,7 +18,7 @@ FULL_SPEEDS: FloatArray = 40.0 / 3.6 * np.exp(LOG_STEP * np.arange(34, dtype=np.
 """Cells of the speed of full aquaplaning, 40 to 208 km/h. [m/s]"""
 NODES: FloatArray = LOG_STEP * np.arange(-5.0, 17.0)
 """Log of the speed of full aquaplaning over the car's, for which the emissions are known. [-]"""
-FEATURES = ("resistance", "slip_more", "slip_less", "shake_more", "shake_less")
+FEATURES = ("drag", "slip_more", "slip_less", "shake_more", "shake_less")
 """Of 0.6 s, less what the same car showed on dry road: resistance, slip of the front axle less that of the rear on the
 side that deviates more and on the other one, log variance of both. [-]"""
 COVARIATES = 3  # 1, log of the speed, traction
