@@ -70,9 +70,30 @@ def own_full(tyre: Tyre, vehicle: Vehicle, depth: float, p: float) -> float:
     return first_stop(friction * F_z, film + (shift + vehicle.rolling_resistance) * F_z)
 
 
-def own_pass(seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE) -> Pass:
-    """A pass of the project's simulator at about one speed: tyre, pressure, water and car are drawn."""
-    rng = np.random.default_rng([seed, 77])
+def any_tyre(tyre: Tyre, rng: np.random.Generator) -> Tyre:
+    """A tyre whose laws of water, contact, drag and friction are drawn far wider than sources have them."""
+
+    def even(low: float, high: float) -> float:
+        return float(low * (high / low) ** rng.uniform())
+
+    return replace(
+        tyre, v_anchor=tyre.v_anchor * even(0.85, 1.15), pressure_exponent=even(0.2, 0.5), thin_gain=even(0.2, 0.9),
+        tread_gain=even(10.0, 50.0), contact_exponent=even(1.5, 6.0), wedge_arm=tyre.wedge_arm * 1.5 * rng.uniform() ** 2,
+        h_film=even(0.15e-3, 1.0e-3), groove_relief=rng.uniform(0.2, 0.9), h_wave=even(0.8e-3, 4e-3),
+        h_track=even(0.2e-3, 0.8e-3), width=tyre.width * rng.uniform(0.2, 1.4), wet_friction=rng.uniform(0.65, 0.95),
+        load_sensitivity=rng.uniform(0.0, 0.3), contact_scatter=even(0.001, 0.12), scatter_length=even(0.2, 2.0),
+        track_irregularity=even(0.03, 0.4), slip_slope_factor=tyre.slip_slope_factor * even(0.8, 1.2),
+    )  # fmt: skip
+
+
+def own_pass(
+    seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE, broad: bool = False
+) -> Pass:
+    """A pass of the project's simulator at about one speed: tyre, pressure, water and car are drawn.
+
+    `broad`: with laws drawn by `any_tyre`, to learn from.
+    """
+    rng = np.random.default_rng([seed, 79 if broad else 77])
     pool = (SCORING_POOL, TUNING_POOL)[int(rng.integers(2))]
     cars = [c for c in pool.vehicles if drivetrain in (None, c.drivetrain)]
     car = cars[int(rng.integers(len(cars)))]
@@ -82,6 +103,7 @@ def own_pass(seed: int, drivetrain: str | None = None, *, distance: tuple[float,
         tread = rng.uniform(1.0e-3, 8.0e-3)
         tyre = replace(TYRES["worn_summer"], tread_depth=tread, slip_slope_factor=1.03 - 0.018e3 * (tread - 1e-3),
                        width=rng.uniform(0.185, 0.235))  # fmt: skip
+        tyre = any_tyre(tyre, rng) if broad else tyre
         depth, p = float(np.exp(rng.uniform(np.log(0.6e-3), np.log(6e-3)))), rng.uniform(1.8e5, 2.8e5)
         full = own_full(tyre, car, depth, p)
         v = full - away
@@ -91,9 +113,10 @@ def own_pass(seed: int, drivetrain: str | None = None, *, distance: tuple[float,
     approach, stay = k.between(9.0, 16.0), 4.0
     a = k.between(-0.4, 0.4) if k.between(0.0, 1.0) < 0.3 else 0.0
     start = (v - a * 4.0) * (approach - 4.0) + 4.0 * (v - 2.0 * a)
+    calm = float(0.03 ** k.rng.uniform()) if broad else 1.0
     lane = Lane(
         start, start + stay * v, in_metres=True, depth_left=depth * k.between(0.6, 1.0), depth_right=depth,
-        irregularity_left=k.between(0.05, 0.4), irregularity_right=k.between(0.03, 0.15),
+        irregularity_left=calm * k.between(0.05, 0.4), irregularity_right=calm * k.between(0.03, 0.4 if broad else 0.15),
     )  # fmt: skip
     speed = ((0.0, v - 4.0 * a), (approach - 4.0, v - 4.0 * a), (approach, v), (approach + stay, v + stay * a))
     scenario = k.drive(approach + stay + 2.0, speed, lanes=(lane,))

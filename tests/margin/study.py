@@ -1,23 +1,12 @@
-"""How well the distance to full aquaplaning holds: passes with a known distance, dry drives, measured drives.
+"""How well the distance to full aquaplaning holds: passes with a known distance, and dry drives.
 
-    python -m tests.margin.study --passes 4000 --first 20000
-    python -m tests.margin.study --foreign --passes 1000 --first 20000     # tests.blind.multibody: other laws
-    python -m tests.margin.study --passes 300 --first 20000 --without v_x,torque_fl,torque_fr,torque_rl,torque_rr
-    python -m tests.margin.study --dry-hours 10 --first 20000              # false warnings of simulated dry drives
-    python -m tests.margin.study --real                                    # and of measured ones
-
-The limit of information is a local Gaussian estimate: slope of the features over the distance and their scatter over
-cars, tyres, water and sensors within 10 km/h, by drivetrain. It is no strict bound.
+python -m tests.margin.study --passes 4000 --first 20000
+python -m tests.margin.study --passes 1000 --first 20000 --foreign     # tests.blind.multibody: other laws
+python -m tests.margin.study --dry-hours 10 --first 20000              # false warnings of simulated dry drives
 """
 
-from __future__ import annotations
-
 import argparse
-import os
-import pickle
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
+from collections import Counter
 
 import numpy as np
 
@@ -28,198 +17,69 @@ from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import draw
 from tests.detect.episode_study import DRY
-from tests.margin.passes import Pass, foreign_pass, own_pass
+from tests.margin.learn import DRIVETRAINS
+from tests.margin.passes import foreign_pass, own_pass
 
 KMH = 3.6
 CELLS = ((-8, 5), (5, 15), (15, 25), (25, 35), (35, 45), (45, 55))  # [km/h]
-DRIVETRAINS = ("rwd", "fwd", "awd")
-HERE = Path(__file__).parents[1] / "real"
-REAL = Path(os.environ.get("AQUALOG_REAL_LOGS", Path(__file__).parents[3] / "shared" / "real_logs"))
+ENDS = ("", "_low", "_high", "_q25", "_q75")
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """One pass, `after` seconds behind the edge of the water: distances in km/h, features for the limit."""
-
-    drivetrain: str
-    true: float
-    median: float
-    low: float
-    high: float
-    q25: float
-    q75: float
-    is_warned: bool
-    is_early: bool
-    features: tuple[float, ...]
-    note: str = field(compare=False, default="")
-
-
-def watched(p: Pass, drop: Sequence[str] = ()):
-    """Features and warning bits of a pass, with this detector alone."""
-    columns = {s: x for s, x in p.columns.items() if s not in drop and not s.startswith("true_")}
-    stream = DriveStream(p.vehicle, round(p.dt * 1e9), columns, detectors=[MARGIN])
-    piece = stream.push(columns)
-    return piece.features, piece.tracks[0].active
-
-
-def outcome(p: Pass, after: float, drop: Sequence[str] = ()) -> Outcome:
-    """Measure one pass."""
-    f, active = watched(p, drop)
+def outcome(p, after=2.0):
+    """One pass, `after` seconds behind the edge of the water: true distance and `ENDS` [km/h], warned, warned early."""
+    columns = {s: x for s, x in p.columns.items() if not s.startswith("true_")}
+    piece = DriveStream(p.vehicle, round(p.dt * 1e9), columns, detectors=[MARGIN]).push(columns)
+    f, active = piece.features, piece.tracks[0].active
     edge, k = int(p.wet[0] / p.dt), int((p.wet[0] + after) / p.dt)
-    names = ("aquaplaning_margin", *(f"aquaplaning_margin_{n}" for n in ("low", "high", "q25", "q75")))
-    found = (float(f[n][k]) * KMH for n in names)
-    before, wet = slice(max(edge - 400, 0), edge - 20), slice(edge + 50, k)
-
-    def change(x) -> float:
-        with np.errstate(invalid="ignore"):
-            return float(np.nanmean(x[wet]) - np.nanmean(x[before]))
-
-    v = f["v_x_hat"]
-    sides = [(f[f"v_line_f{s}"] - f[f"v_line_r{s}"]) / v for s in "lr"]
-    slips = [np.arcsinh(change(x) / 5e-4) for x in sides]
-    shake = [float(np.log(np.nanstd(x[wet]) + 1e-5)) for x in sides]
-    force = change(f["delta_a_x"]) if "delta_a_x" in f else 0.0
-    warned, early = bool(active[edge : edge + 200].any()), bool(active[: edge - 20].any())
-    true = float(p.v_full - v[k]) * KMH
-    return Outcome(p.drivetrain, true, *found, warned, early, (force, *slips, *shake), p.note)
+    found = (f[f"aquaplaning_margin{end}"][k] for end in ENDS)
+    warned, early = active[edge : edge + 200].any(), active[: edge - 20].any()
+    return (*(KMH * x for x in (p.v_full - f["v_x_hat"][k], *found)), warned, early)
 
 
-def limit(outcomes: Sequence[Outcome], low: float, high: float) -> float:
-    """Standard deviation of the distance that the features allow in a cell [km/h]; NaN with too few passes."""
-    middle, sds = 0.5 * (low + high), []
-    for drivetrain in DRIVETRAINS:
-        near = [o for o in outcomes if o.drivetrain == drivetrain and abs(o.true - middle) < 10.0]
-        x = np.array([o.features for o in near])
-        if len(near) < 25 or not np.isfinite(x).all():
-            continue
-        d = np.array([o.true for o in near]) - middle
-        form = np.stack([np.ones_like(d), d], axis=1)
-        fit, *_ = np.linalg.lstsq(form, x, rcond=None)
-        left = x - form @ fit
-        scatter = left.T @ left / (len(near) - 2) + 1e-9 * np.eye(x.shape[1])
-        sds.append(float(fit[1] @ np.linalg.solve(scatter, fit[1])) ** -0.5)
-    return float(np.mean(sds)) if sds else float("nan")
-
-
-def lines(outcomes: Sequence[Outcome], title: str) -> Iterator[str]:
+def lines(x, title):
     """A row for each cell of the true distance."""
-    yield f"{title}: n {len(outcomes)}, warned before the water {sum(o.is_early for o in outcomes)}"
+    yield f"{title}: n {len(x)}, warned before the water {int(x[:, 7].sum())}"
     for low, high in CELLS:
-        cell = [o for o in outcomes if low <= o.true < high]
-        if not cell:
-            continue
-        x = np.array([(o.true, o.median, o.low, o.high, o.q25, o.q75) for o in cell])
-        has = np.isfinite(x[:, 1])
-        away = x[has, 1] - x[has, 0]
-        in90 = np.mean((x[has, 2] <= x[has, 0]) & (x[has, 0] <= x[has, 3]))
-        in50 = np.mean((x[has, 4] <= x[has, 0]) & (x[has, 0] <= x[has, 5]))
+        cell = x[(x[:, 0] >= low) & (x[:, 0] < high)]
+        has = cell[np.isfinite(cell[:, 1])]
+        true, away = has[:, 0], has[:, 1] - has[:, 0]
+        in90, in50 = (np.mean((has[:, a] <= true) & (true <= has[:, a + 1])) for a in (2, 4))
         yield (
-            f"  {low:3d} to {high:2d} km/h: n {len(cell):4d}, distance given {has.mean():.2f}; median error "
+            f"  {low:3d} to {high:2d} km/h: n {len(cell):4d}, distance given {len(has) / len(cell):.2f}; median error "
             f"{np.median(np.abs(away)):4.1f}, bias {np.median(away):+5.1f}, 90 % holds {in90:.2f}, 50 % holds {in50:.2f}, "
-            f"half width {0.5 * np.median(x[has, 3] - x[has, 2]):4.1f}; limit sd {limit(outcomes, low, high):4.1f}; "
-            f"warned {np.mean([o.is_warned for o in cell]):.2f}"
+            f"half width {0.5 * np.median(has[:, 3] - has[:, 2]):4.1f}; warned {cell[:, 6].mean():.2f}"
         )
 
 
-def recall_to(outcomes: Sequence[Outcome]) -> float:
-    """Distance [km/h] down to which 95 % of the passes are warned within 2 s."""
-    ordered = sorted(outcomes, key=lambda o: o.true)
-    best = float("nan")
-    for low in np.arange(0.0, 50.0, 1.0):
-        cell = [o.is_warned for o in ordered if low - 2.5 <= o.true < low + 2.5]
-        if len(cell) < 8 or np.mean(cell) < 0.95:
-            break
-        best = float(low)
-    return best
+def study(a):
+    make, seeds = foreign_pass if a.foreign else own_pass, range(a.first, a.first + a.passes)
+    x = np.array([outcome(make(seed, DRIVETRAINS[seed % 3])) for seed in seeds], dtype=float)
+    print("\n".join(lines(x, "foreign" if a.foreign else "own")))
 
 
-def study(a: argparse.Namespace) -> None:
-    make, drop = foreign_pass if a.foreign else own_pass, tuple(a.without.split(",")) if a.without else ()
-    outcomes: list[Outcome] = []
-    kept = list(pickle.loads(a.passes_in.read_bytes())) if a.passes_in else None  # of this command alone
-    for n in range(len(kept) if kept else a.passes):
-        p = kept[n] if kept else make(a.first + n, DRIVETRAINS[n % 3])
-        outcomes.append(outcome(p, a.after, drop))
-        if (n + 1) % 500 == 0:
-            print(f"{n + 1} passes", flush=True)
-    print("\n".join(lines(outcomes, "foreign" if a.foreign else "own")))
-    for drivetrain in DRIVETRAINS:
-        some = [o for o in outcomes if o.drivetrain == drivetrain]
-        if a.by_drivetrain:
-            print("\n".join(lines(some, drivetrain)))
-        print(f"{drivetrain}: 95 % warned down to {recall_to(some):.0f} km/h")
-    print(f"all: 95 % warned down to {recall_to(outcomes):.0f} km/h below full aquaplaning")
-
-
-def warnings_in(signals, vehicle) -> list[tuple[float, float, float]]:
-    """Begin, end [s] and greatest probability of each warning of a drive."""
-    present = [s for s in signals.symbols if not s.startswith("true_") and np.isfinite(signals.array(s)).any()]
-    stream = DriveStream(vehicle, signals.dt_ns, present, detectors=[MARGIN])
-    if not stream.watches:
-        return []
-    piece = stream.push({s: signals.array(s) for s in present})
-    return [(e.start_s, e.end_s, e.peak) for e in (*piece.events, *stream.finish())]
-
-
-def dry(a: argparse.Namespace) -> None:
-    seconds, found, seed = 0.0, 0, a.first
-    names = a.situations.split(",") if a.situations else DRY
-    by: dict[str, int] = {}
+def dry(a):
+    seconds, by, seed = 0.0, Counter(), a.first
     while seconds < 3600.0 * a.dry_hours:
-        for name in names:
+        for name in DRY:
             drawn = draw(name, seed, SCORING_POOL)
             signals = as_signals(simulate(drawn.scenario, drawn.model), vehicle=drawn.believed)
-            warned = warnings_in(signals, drawn.believed)
-            seconds, found = seconds + signals.duration_s, found + len(warned)
-            for begin, end, peak in warned:
-                by[name] = by.get(name, 0) + 1
-                print(f"{name} {seed} {drawn.note}: {begin:.1f}-{end:.1f} s, {peak:.2f}", flush=True)
+            present = [s for s in signals.symbols if not s.startswith("true_") and np.isfinite(signals.array(s)).any()]
+            stream = DriveStream(drawn.believed, signals.dt_ns, present, detectors=[MARGIN])
+            events = (*stream.push({s: signals.array(s) for s in present}).events, *stream.finish())
+            seconds, by[name] = seconds + signals.duration_s * len(stream.watches), by[name] + len(events)
+            for e in events:
+                print(f"{name} {seed} {drawn.note}: {e.start_s:.1f}-{e.end_s:.1f} s, {e.peak:.2f}", flush=True)
         seed += 1
-    print(f"{seconds / 3600.0:.2f} h dry, seeds {a.first} to {seed - 1}: {found} false warnings {by}")
+    print(f"{seconds / 3600.0:.2f} h dry, seeds {a.first} to {seed - 1}: {by.total()} false warnings {+by}")
 
 
-def real() -> None:
-    """Warnings on the measured dry drives that have wheel speeds."""
-    from aqualog.align.load import load_signals
-    from aqualog.config.signal_map import load_signal_map
-    from aqualog.config.vehicle import load_vehicle
-
-    for name, files, dbc in (
-        ("toyota", ("toyota_rav4/can_bus.mf4",), ("toyota_rav4/toyota_2017.dbc",)),
-        *(("bmw_i3", (f"bmw_i3/{p.name}",), ()) for p in sorted((REAL / "bmw_i3").glob("*.csv"))),
-    ):
-        car = HERE / f"{name}.toml"
-        if not car.exists():
-            continue
-        vehicle = load_vehicle(car)
-        signals = load_signals(
-            [REAL / f for f in files], vehicle=vehicle, signal_map=load_signal_map(HERE / f"{name}_map.toml"),
-            dbc=[REAL / f for f in dbc],
-        )  # fmt: skip
-        lacks = MARGIN.needs(vehicle, signals.symbols, 1e9 / signals.dt_ns).missing
-        print(*files, f"{signals.duration_s:.0f} s", f"lacks {', '.join(lacks)}" if lacks else "",
-              warnings_in(signals, vehicle), flush=True)  # fmt: skip
-
-
-def main() -> None:
+def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--passes", type=int, default=0)
-    parser.add_argument("--first", type=int, default=20_000)
     parser.add_argument("--foreign", action="store_true")
-    parser.add_argument("--after", type=float, default=2.0, help="seconds behind the edge of the water")
-    parser.add_argument("--without", default="", help="signals that the logs lack")
-    parser.add_argument("--by-drivetrain", action="store_true")
-    parser.add_argument("--passes-in", type=Path, help="a pickle of passes instead of new ones")
-    parser.add_argument("--dry-hours", type=float, default=0.0)
-    parser.add_argument("--situations", default="")
-    parser.add_argument("--real", action="store_true")
+    for name, default in (("passes", 0), ("first", 20_000), ("dry-hours", 0)):
+        parser.add_argument(f"--{name}", type=int, default=default)
     a = parser.parse_args()
-    if a.passes or a.passes_in:
-        study(a)
-    if a.dry_hours:
-        dry(a)
-    if a.real:
-        real()
+    study(a) if a.passes else dry(a)
 
 
 if __name__ == "__main__":

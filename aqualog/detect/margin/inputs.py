@@ -15,13 +15,14 @@ from aqualog.physics.load import G
 
 __all__ = ["Reader"]
 
-V_MIN = 11.0  # [m/s] slower, water does nothing that counts
+V_MIN = 5.0  # [m/s] slower, wheel speeds are too coarse
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering costs more than the balance knows
 A_MOST, A_LEAST = 0.5, -1.5  # [m/s^2] beyond, an unknown trailer shows more than water; braking
 U_MAX = 0.25  # [-] of the traction: beyond, the slip of a dry tyre is no longer a line
 JUMP = 0.03  # [-] of the traction within a tenth of a second: a gear shift, which torque signals report late
 HOLD = 0.3  # [s] after it
 TAU_JUMP = 0.1  # [s]
+STANDS = 0.25  # [s] a wheel speed that does not change by a bit for longer has stopped coming
 
 
 @compiled
@@ -31,6 +32,16 @@ def _gate(samples, left, jump):  # type: ignore[no-untyped-def]
         left = samples if jump[i] else max(left - 1, 0)
         out[i] = left > 0
     return out, left
+
+
+@compiled
+def _stands(least, last, run, x):  # type: ignore[no-untyped-def]
+    out = np.empty(x.size, dtype=np.bool_)
+    for i in range(x.size):
+        run = run + 1 if x[i] == last else 0
+        last = x[i]
+        out[i] = run >= least
+    return out, last, run
 
 
 class Reader:
@@ -47,6 +58,7 @@ class Reader:
         self._dt = dt
         self._slow = {"f": UNSET, "r": UNSET}
         self._left = 0
+        self._stands = dict.fromkeys(WHEELS, (UNSET, 0))
         front = vehicle.mass * G * vehicle.l_r / vehicle.wheelbase
         self._load = {"f": 0.5 * front, "r": 0.5 * (vehicle.mass * G - front)}  # of a wheel
 
@@ -63,12 +75,22 @@ class Reader:
         R = np.where(trusted, f["delta_a_x"], np.nan)
         sides = []
         for i, side in enumerate("lr"):
-            front, rear = (f.get(f"v_line_{axle}{side}") for axle in "fr")
+            front, rear = (self._turning(scene, f"{axle}{side}") for axle in "fr")
             with np.errstate(invalid="ignore", divide="ignore"):
                 slip = none if front is None or rear is None else (front - rear) / v
                 small = np.maximum(np.abs(u[i]), np.abs(u[2 + i])) < U_MAX
             sides.append(np.where(trusted & small, slip, np.nan))
         return Inputs(v, f["a_x_slow"], R, *sides, *u)
+
+    def _turning(self, scene: Scene, wheel: str) -> FloatArray | None:
+        """Speed of a wheel on the centre line, NaN where its signal stands still. [m/s]"""
+        v = scene.f.get(f"v_line_{wheel}")
+        if v is None:
+            return None
+        least = max(2, round(STANDS / self._dt))
+        bits, *state = _stands(least, *self._stands[wheel], scene.columns[f"omega_{wheel}"])
+        self._stands[wheel] = (float(state[0]), int(state[1]))
+        return np.where(bits, np.nan, v)
 
     def _jumps(self, front: FloatArray, rear: FloatArray) -> BoolArray:
         """Where the traction of an axle has just changed faster than torque signals follow."""

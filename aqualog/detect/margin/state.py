@@ -1,4 +1,4 @@
-"""Tuning, inputs and state of the filter of the distance to full aquaplaning."""
+"""Features, tuning, inputs, learnt tables and state of the filter of the distance to full aquaplaning."""
 
 from __future__ import annotations
 
@@ -7,16 +7,30 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.detect.margin.laws import DEPTHS, FULL_SPEEDS, Tables
 
-__all__ = ["OUTPUTS", "Filter", "FilterParams", "Inputs"]
+__all__ = [
+    "COLUMNS", "COVARIATES", "FEATURES", "FULL_SPEEDS", "LOG_STEP", "NODES", "OUTPUTS", "ROWS", "Emissions", "Filter",
+    "FilterParams", "Inputs",
+]  # fmt: skip
+
+LOG_STEP = 0.05
+FULL_SPEEDS: FloatArray = 40.0 / 3.6 * np.exp(LOG_STEP * np.arange(34, dtype=np.float64))
+"""Cells of the speed of full aquaplaning, 40 to 208 km/h. [m/s]"""
+NODES: FloatArray = LOG_STEP * np.arange(-5.0, 17.0)
+"""Log of the speed of full aquaplaning over the car's, for which the emissions are known. [-]"""
+FEATURES = ("drag", "slip_more", "slip_less", "shake_more", "shake_less")
+"""Of 0.6 s, less what the same car showed on dry road: resistance, slip of the front axle less that of the rear on the
+side that deviates more and on the other one, log variance of both. [-]"""
+COVARIATES = 3  # 1, log of the speed, traction
 
 OUTPUTS = ("p_water", "p_near", "low", "q25", "median", "q75", "high", "contact", "v_full")
 """Rows of what a scan returns: probabilities [-], quantiles of the distance [m/s], contact share [-], speed [m/s]."""
+ROWS = 6  # steps of the window
+COLUMNS = 11  # means of a step: inputs, and the variance of both slips within it
 
 
 class FilterParams(NamedTuple):
-    """Tuning in physical units; noise as learnt on dry drives of the simulator."""
+    """Tuning in physical units."""
 
     block: int  # samples of one step
     dt: float  # [s] of a step
@@ -25,44 +39,33 @@ class FilterParams(NamedTuple):
     slope_r: float
     rolling: float
     friction: float
-    noise_R: float = 0.06  # [m/s^2] of a step
-    noise_D: float = 3.0e-4  # [-] of a step
-    scale_D: float = 5.0e-4  # [-] slips below it are read on a linear scale, above it on a logarithmic one
-    share_D: float = 0.15  # of the slip of the drive: the file's slope is not the tyre's
-    shake: float = 0.25  # [-] log of a wet slip from step to step
-    share_axle: float = 0.08  # the same of what both axles share
-    walk_share: float = 0.002  # [1 / sqrt(s)]
-    share_F: float = 0.25  # [-] log of a wet slip, beside the tyres' spread
-    most: float = 2.5  # of standard deviations by which a tyre differs from the mean of all
-    floats: float = 0.8  # [-] the same from step to step
-    stopped: float = 1.0  # [-] log of the slip of a wheel that no longer holds
-    brave: float = 8.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
-    offset_R: float = 0.12  # [m/s^2] before anything is known
-    offset_D: float = 5.0e-2  # [-] worn beside new tyres, a spare wheel
-    walk_R: float = 0.006  # [m/s^2 / sqrt(s)]
-    walk_D: float = 3.0e-5  # [1 / sqrt(s)]
-    bias_s: float = 8.0  # [s] correlation of what the laws do not know
-    to_water: float = 1.0 / 300.0  # [1/s]
-    to_dry: float = 1.0 / 4.0
-    to_other: float = 1.0 / 60.0
-    from_other: float = 1.0 / 3.0
-    other_wets: float = 0.2  # share of what else ends in water
-    other_s: float = 60.0  # [s] correlation of what else disturbs
+    v_least: float = 11.0  # [m/s] slower, water does nothing that counts
+    scale_R: float = 0.1  # [m/s^2] below it a feature is linear, above it logarithmic
+    scale_D: float = 5.0e-4  # [-] the same of a slip
+    noise_R: float = 0.10  # [m/s^2] of a step
+    noise_D: float = 4.0e-4  # [-] of a step, beside what its samples scatter
+    noise_M: float = 1.0  # [-] of a log variance
+    offset_R: float = 0.15  # [m/s^2] before anything is known
     share_a: float = 0.3  # [-] of the specific force: an unknown trailer or load
+    offset_D: float = 5.0e-2  # [-] worn beside new tyres, a spare wheel
+    share_D: float = 0.15  # [-] of the slips of both axles: the file's slopes are not the tyres'
+    shake: float = -14.0  # [-] log variance of a slip
+    offset_M: float = 2.0  # [-]
+    walk_R: float = 0.01  # [m/s^2 / sqrt(s)]
     walk_a: float = 0.003  # [1 / sqrt(s)]
-    anew_R: float = 0.05  # [m/s^2 / sqrt(s)] another wind, a trailer
-    slip_s: float = 5.0  # [s] correlation of what a dry slip has beyond offset and slope
-    noisy: float = 1.5  # [-] noise of a step's mean over its samples' own scatter
-    anew_D: float = 1.0e-3  # [1 / sqrt(s)] another wheel, a tyre that loses air
-    drift_V: float = 0.8  # [m/s / sqrt(s)] of the full speed along the road
-    other_R: float = 0.3  # [m/s^2] of what else disturbs
-    other_y: float = 2.0
-    slip_most: float = 0.02  # [-] no dry road takes so much of a wheel's speed without a brake
-    anew_most: float = 5.0e-3  # [-] to which the offset's deviation grows again
-    sure: float = 0.65  # [-] share of the water's resistance that a tyre may lack, for a warning
-    noise_s: float = 5.0  # [s] memory of the noise of the dry slip
-    clip: float = 12.0  # of a squared deviation: no single step decides
-    start_water: float = 0.01  # probability of water at the start
+    walk_D: float = 5.0e-5  # [1 / sqrt(s)]
+    walk_share: float = 0.002  # [1 / sqrt(s)]
+    walk_M: float = 0.03  # [1 / sqrt(s)]
+    to_water: float = 1.0 / 300.0  # [1/s]
+    to_dry: float = 1.0 / 10.0
+    among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
+    start_water: float = 0.02  # probability of water at the start
+    brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
+    weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay
+    law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
+    law_M: float = 2.0  # [-] the same of the log variances
+    keep_s: float = 0.8  # [s] memory of the evidence on the full speed
+    tail: float = 6.0  # degrees of freedom: how rare what was not drawn is
 
 
 class Inputs(NamedTuple):
@@ -82,44 +85,54 @@ class Inputs(NamedTuple):
     u_rr: FloatArray
 
 
-class Filter(NamedTuple):
-    """State: by cell weight and offsets with variances; the same of what else disturbs; the dry road's own.
+class Emissions(NamedTuple):
+    """Mean by covariates (nodes, features, covariates) and covariance (nodes, features, features) at each distance.
 
-    `dry`: weight; offset of the resistance, its share of the specific force (an unknown load or trailer), and their
-    covariance; deviation of the slip and its variance. `sides` (2, 7): offset of the slip, share by which its slope is
-    off, their covariance, last deviation, variance from step to step. `others` (3, 5): weight, then offsets with
-    variances of resistance and slip.
+    `contact` (nodes,) [-] of the front axle; `prior` (full speeds,). `kind_` the same of kinds of road, dry and wet:
+    their shares sum to 1 among the dry and among the wet; `is_wet` 0 or 1.
     """
 
-    w: FloatArray  # (full speeds, waters)
-    b_R: FloatArray
-    P_R: FloatArray
-    b_y: FloatArray
-    P_y: FloatArray
-    dry: FloatArray
+    mean: FloatArray
+    scatter: FloatArray
+    contact: FloatArray
+    prior: FloatArray
+    kind_mean: FloatArray
+    kind_scatter: FloatArray
+    kind_prior: FloatArray
+    is_wet: FloatArray
+
+
+class Filter(NamedTuple):
+    """State: evidence on the full speeds, what a dry road shows, and the steps of the window.
+
+    `R` (5,): offset of the resistance [m/s²], its share of the specific force (an unknown load or trailer), covariance.
+    `sides` (2, 7): offset of the slip, share of the axles' slips that it is off by, covariance, log variance and its
+    variance.
+    """
+
+    evidence: FloatArray  # (full speeds,) log
+    kinds: FloatArray  # (kinds,) probabilities of kinds of dry and wet road
+    R: FloatArray
     sides: FloatArray
-    others: FloatArray
+    window: FloatArray  # (ROWS, COLUMNS)
     sums: FloatArray  # (3, 9) sums, counts and sums of squares of the running step
-    samples: FloatArray  # (1,) of the running step
+    samples: FloatArray  # (2,) of the running step; steps so far
+    x: FloatArray  # (2, features) of the last window, and variances of what they are compared with
     out: FloatArray  # (len(OUTPUTS),)
 
     @staticmethod
-    def new(p: FilterParams, tables: Tables) -> Filter:
+    def new(p: FilterParams, t: Emissions) -> Filter:
         """Return the state before the first sample."""
-        shape = (FULL_SPEEDS.size, DEPTHS.size)
-        side = np.array([0.0, 0.0, p.offset_D**2, 0.0, p.share_D**2, np.nan, 0.0])
-        dry = np.array([1.0 - p.start_water, 0.0, 0.0, p.offset_R**2, 0.0, p.share_a**2, 0.0, 0.0])
+        side = np.array([0.0, 0.0, p.offset_D**2, 0.0, p.share_D**2, p.shake, p.offset_M**2])
         return Filter(
-            w=p.start_water * tables.prior.copy(),
-            b_R=np.zeros(shape),
-            P_R=np.full(shape, p.offset_R**2),
-            b_y=np.zeros(shape),
-            P_y=np.ones(shape),
-            dry=dry,
+            evidence=np.zeros(FULL_SPEEDS.size),
+            kinds=t.kind_prior * np.where(t.is_wet > 0.0, p.start_water, 1.0 - p.start_water),
+            R=np.array([0.0, 0.0, p.offset_R**2, 0.0, p.share_a**2]),
             sides=np.stack([side, side]),
-            others=np.zeros((3, 5)),
+            window=np.full((ROWS, COLUMNS), np.nan),
             sums=np.zeros((3, 9)),
-            samples=np.zeros(1),
+            samples=np.zeros(2),
+            x=np.full((2, len(FEATURES)), np.nan),
             out=np.full(len(OUTPUTS), np.nan),
         )
 

@@ -22,12 +22,12 @@ from aqualog.detect.detector import (
     missing_wheels,
     too_slow,
 )
+from aqualog.detect.margin.emissions import emissions_of
 from aqualog.detect.margin.inputs import Reader
-from aqualog.detect.margin.laws import tables_of
 from aqualog.detect.margin.recursion import scan
 from aqualog.detect.margin.state import OUTPUTS, Filter, FilterParams
 
-__all__ = ["FEATURES", "MARGIN", "Least", "MarginWatch"]
+__all__ = ["FEATURES", "MARGIN", "Least", "MarginWatch", "params"]
 
 THRESHOLD = 0.5  # [-]
 NEAR = 30.0 / 3.6  # [m/s]
@@ -51,32 +51,31 @@ def _lasting(least, near, run):  # type: ignore[no-untyped-def]
     return out, run
 
 
+def params(vehicle: Vehicle, dt: float) -> FilterParams:
+    """Return the tuning for a car and a sample time [s]."""
+    block = max(1, round(STEP_S / dt))
+    return FilterParams(
+        block, block * dt, NEAR, vehicle.slip_slope_f, vehicle.slip_slope_r, vehicle.rolling_resistance, vehicle.mu_max
+    )
+
+
 class MarginWatch:
     """Distance to full aquaplaning, and a warning while it is probably below 30 km/h, in three steps in a row."""
 
     def __init__(self, setup: Setup) -> None:
         vehicle = setup.vehicle
-        block = max(1, round(STEP_S / setup.dt))
         self._setup = setup
         self._reader = Reader(vehicle, setup.dt)
-        self._params = FilterParams(
-            block,
-            block * setup.dt,
-            NEAR,
-            vehicle.slip_slope_f,
-            vehicle.slip_slope_r,
-            vehicle.rolling_resistance,
-            vehicle.mu_max,
-        )
-        self._tables = tables_of(vehicle)
-        self._state = Filter.new(self._params, self._tables)
-        self._least = 2 * block + 1
+        self._params = params(vehicle, setup.dt)
+        self._emissions = emissions_of(vehicle.drivetrain)
+        self._state = Filter.new(self._params, self._emissions)
+        self._least = 2 * self._params.block + 1
         self._run = 0
 
     def push(self, scene: Scene) -> Output:
         """Take the next piece: one track, the probability that full aquaplaning is less than 30 km/h away. [-]"""
         v = scene.f["v_x_hat"]
-        values, self._state = scan(self._params, self._tables, self._state, self._reader.push(scene))
+        values, self._state = scan(self._params, self._emissions, self._state, self._reader.push(scene))
         values = np.where(np.isnan(v), np.nan, values)
         rows = dict(zip(OUTPUTS, values, strict=True))
         with np.errstate(invalid="ignore"):

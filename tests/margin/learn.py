@@ -1,0 +1,141 @@
+"""Learn what water and dry roads show: `aqualog/detect/margin/emissions.toml`.
+
+    python -m tests.margin.learn --passes 3600 --drives 24 --keep /tmp/windows.npz
+
+Windows come from passes whose tyres are drawn by `passes.any_tyre`, and from dry drives of the tuning pool. What is
+compared with is learnt from the dry road before, by the filter itself, which is told where the water is.
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from aqualog.detect.braking import BrakeWatch
+from aqualog.detect.detector import Scene
+from aqualog.detect.margin import emissions, state
+from aqualog.detect.margin.inputs import Reader
+from aqualog.detect.margin.recursion import scan
+from aqualog.detect.margin.state import FULL_SPEEDS, NODES, Emissions, Filter, Inputs
+from aqualog.detect.margin.watch import params
+from aqualog.features.stream import FeatureStream
+from aqualog.model.drawing import KMH, TUNING_POOL
+from aqualog.model.log import as_signals
+from aqualog.model.simulate import simulate
+from aqualog.model.situations import draw
+from aqualog.model.tyre import TYRES
+from aqualog.physics.hydroplaning import gallaway_speed, usf_speed
+from tests.detect.episode_study import DRY
+from tests.margin.passes import own_pass
+
+DRIVETRAINS = ("rwd", "fwd", "awd")
+DISTANCE = (-20.0 * KMH, 100.0 * KMH)
+WATER, EDGE = (0.8, 1.4, 2.0, 2.6, 3.2, 3.7), (0.2, 0.3, 0.4, 0.5, 0.7)  # [s] behind the begin of the water
+WET = 0.6  # [-] log ratio up to which water counts as such
+STOPS_AT = 0.93  # a free wheel stops at about this share of the speed at which its contact ends
+LAW_SD = 0.20  # [-] log of a tyre's full speed about a law
+_N, _Z = len(state.FEATURES), state.COVARIATES
+NEUTRAL = Emissions(
+    np.zeros((NODES.size, _N, _Z)), np.tile(1e9 * np.eye(_N), (NODES.size, 1, 1)), np.ones(NODES.size),
+    np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((2, _N, _Z)), np.tile(1e9 * np.eye(_N), (2, 1, 1)),
+    np.ones(2), np.array([0.0, 1.0]),
+)  # fmt: skip
+
+
+def windows(columns, vehicle, dt, wet=(1e9, 1e9)):
+    """Features and covariates (steps, 8), NaN where one is missing, of a drive; `wet` [s]: where the water is."""
+    columns = {s: x for s, x in columns.items() if not s.startswith("true_") and np.isfinite(x).any()}
+    stream = FeatureStream(vehicle, dt, columns)
+    f = stream.push(columns)
+    known = {s: columns[s] for s in stream.available}
+    inputs = Reader(vehicle, dt).push(Scene(f, BrakeWatch(vehicle, dt).push(f, known), known))
+    p = params(vehicle, dt)
+    now, rows = Filter.new(p, NEUTRAL), []
+    for k in range(f["v_x_hat"].size // p.block):
+        at = slice(k * p.block, (k + 1) * p.block)
+        is_wet = wet[0] - 0.1 <= k * p.dt < wet[1] + 1.0
+        now.kinds[:] = (0.0, 1.0) if is_wet else (1.0, 0.0)
+        _, now = scan(p, NEUTRAL, now, Inputs(*(x[at] for x in inputs)))
+        traction = np.nanmean(np.nansum(now.window[:, 5:9], axis=1)) * 0.5
+        v = now.window[int(now.samples[1] - 1) % state.ROWS, 0]
+        x = now.x[0] if (now.x[1] < 1.0).all() and v > p.v_least else np.full(_N, np.nan)
+        with np.errstate(invalid="ignore"):
+            rows.append((*x, 1.0, np.log(v / 30.0), np.arcsinh(traction / 0.02)))
+    return np.array(rows)
+
+
+def of_passes(first, number):
+    """Rows of drivetrain, kind of road (0 dry, 1 water, 2 its edge), log ratio, contact share, window."""
+    for n in range(number):
+        p = own_pass(first + n, DRIVETRAINS[n % 3], distance=DISTANCE, broad=True)
+        x = windows(p.columns, p.vehicle, p.dt, p.wet)
+        contact = 0.5 * (p.columns["true_contact_fl"] + p.columns["true_contact_fr"])
+        for road, times in ((1, WATER), (2, EDGE)):
+            for k in (round((p.wet[0] + after) / 0.1) for after in times):
+                if k < len(x):
+                    here = contact[round((0.1 * k - 0.5) / p.dt) : round((0.1 * k + 0.1) / p.dt)].mean()
+                    yield n % 3, road, np.log(p.v_full / 30.0) - x[k, _N + 1], here, *x[k]
+        yield from ((n % 3, 0, np.nan, np.nan, *row) for row in x[40 : round(p.wet[0] / 0.1) - 2 : 20])
+
+
+def of_drives(first, number):
+    """The same of dry drives."""
+    for name, seed in ((name, first + n) for n in range(number) for name in DRY):
+        drawn = draw(name, seed, TUNING_POOL)
+        signals = as_signals(simulate(drawn.scenario, drawn.model), vehicle=drawn.believed)
+        x = windows({s: signals.array(s) for s in signals.symbols}, drawn.believed, signals.dt_ns * 1e-9)
+        yield from ((DRIVETRAINS.index(drawn.believed.drivetrain), 0, np.nan, np.nan, *row) for row in x[30::5])
+
+
+def prior(rng, n=4000):
+    """How likely each full speed is before any evidence: of tyres, pressures and depths, by three laws that disagree."""
+    ends = ((0.6e-3, 6e-3), (1.8e5, 2.9e5), (1e-3, 8e-3))  # [m, Pa, m] depth, pressure, tread
+    drawn = np.array([low * (high / low) ** rng.uniform(size=n) for low, high in ends])
+    load = np.array(4000.0)
+    tyres = (replace(TYRES["worn_summer"], tread_depth=t) for t in drawn[2])
+    laws = (
+        [STOPS_AT * tyre.full_speed(h, load, p=p) for tyre, h, p in zip(tyres, drawn[0], drawn[1], strict=True)],
+        [gallaway_speed(h, p, tread_depth=t, texture_depth=0.8e-3) for h, p, t in drawn.T],
+        usf_speed(drawn[0], drawn[1], load),
+    )
+    away = np.log(FULL_SPEEDS[:, None] / np.concatenate(laws)) / LAW_SD
+    found = np.exp(-0.5 * away * away).mean(axis=1)
+    return found / found.sum()
+
+
+def learn(found):
+    """Emissions by drivetrain from rows of windows."""
+    found = found[np.isfinite(found[:, 4:]).all(axis=1)]
+    before, tables = prior(np.random.default_rng(5)), {}
+    for d, drivetrain in enumerate(DRIVETRAINS):
+        own = found[found[:, 0] == d]
+        road, ratio, x = own[:, 1], own[:, 2], own[:, 4:]
+        at, rng = road == 1, np.random.default_rng(1)
+        near = np.exp(-0.5 * ((ratio[at] - NODES[:, None]) / emissions.BANDWIDTH) ** 2)
+        kinds = [emissions.kinds_of(x[some, :_N], rng) for some in (road == 0, (road > 0) & (ratio < WET))]
+        m, S, share = (np.concatenate(k) for k in zip(*kinds, strict=True))
+        m = np.concatenate([m[..., None], np.zeros((*m.shape, _Z - 1))], axis=2)
+        tables[drivetrain] = Emissions(
+            *emissions.laws_of(x[at, :_N], x[at, _N:], ratio[at]), near @ own[at, 3] / near.sum(axis=1), before, m, S,
+            share, np.repeat([0.0, 1.0], emissions.KINDS),
+        )  # fmt: skip
+    return tables, len(found)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, default in (("passes", 3600), ("drives", 24), ("first", 100_000)):
+        parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--keep", type=Path, default=Path("windows.npz"), help="file of windows, taken where it exists")
+    a = parser.parse_args()
+    if not a.keep.exists():
+        np.savez(a.keep, x=np.array([*of_passes(a.first, a.passes), *of_drives(a.first, a.drives)]))
+    tables, n = learn(np.load(a.keep)["x"])
+    note = f"Made by `python -m tests.margin.learn` from {n} windows."
+    target = Path(emissions.__file__).with_name("emissions.toml")
+    target.write_text("\n".join(emissions.text_of(tables, note)) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
