@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 import numpy as np
 
@@ -17,14 +17,17 @@ from aqualog.model.term import Model
 __all__ = ["repeats"]
 
 THIRDS = 3
+TINY = 1e-12
 SEEN = 2.0  # standard deviations at which a third of the drive says something of a value
 
 
-def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], model: Model) -> tuple[str, ...]:
-    """What speaks against naming the members of a refitted set; empty if nothing does.
+def repeats(
+    refit: Refit, arena: Arena, noises: Sequence[Noise], model: Model, names: Container[str]
+) -> tuple[str, ...]:  # fmt: skip
+    """What speaks against naming some members of a refitted set, by their keys; empty if nothing does.
 
     Each third of the drives that says something of a value must give it the same sign, and must be predicted better
-    with the values of the other two thirds than without the set.
+    with the values of the other two thirds than without the set. No value may stand at its physical bound.
     """
     off = np.array(
         [v - value_in(model, refit.members[i], n) for (i, n), v in zip(refit.names, refit.values, strict=True)]
@@ -37,15 +40,22 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], model: Model) -
         own = np.linalg.inv(G[t] + prior)
         alone, sd = own @ b[t], np.sqrt(np.diag(own))
         for k, (i, _) in enumerate(refit.names):
-            if abs(off[k]) > SEEN * sd[k] and alone[k] * off[k] < 0.0 and abs(alone[k]) > SEEN * sd[k]:
+            is_named = refit.members[i].key in names
+            if is_named and abs(off[k]) > SEEN * sd[k] and alone[k] * off[k] < 0.0 and abs(alone[k]) > SEEN * sd[k]:
                 h = refit.members[i]
                 out.append(f"{name_of(h.effect.name, h.where)} has the other sign in {_ORDINAL[t]} third of the drive.")
         rest = [o for o in range(THIRDS) if o != t]
         others = np.linalg.solve(sum(G[o] for o in rest) + prior, sum(b[o] for o in rest))
         total += float(2.0 * b[t] @ others - others @ G[t] @ others)
     if total <= 0.0:
-        names = ", ".join(name_of(h.effect.name, h.where) for h in refit.members)
-        out.append(f"{names}: two thirds of the drive do not predict the other third better with it.")
+        every = ", ".join(name_of(h.effect.name, h.where) for h in refit.members)
+        out.append(f"{every}: two thirds of the drive do not predict the other third better with it.")
+    named = [
+        (refit.members[i].parameter(n), v) for (i, n), v in zip(refit.names, refit.values, strict=True)
+        if refit.members[i].key in names
+    ]  # fmt: skip
+    if any(v <= p.low + TINY or v >= p.high - TINY for p, v in named):
+        out.append("a value stands at its physical bound.")
     return tuple(out)
 
 

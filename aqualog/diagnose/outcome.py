@@ -69,8 +69,8 @@ def conclude(found: Found, model: Model) -> Outcome:
         chosen, noises = best.option.refit, [w.noise for w in found.posterior.weighings]
         if chosen is None:
             return ()
-        failed = repeats(chosen, found.arena, noises, model)
-        return (*failed, "a value stands at its physical bound.") if chosen.at_bound else failed
+        # a member that is too small to be worth naming is not named: its sign says nothing against the others
+        return repeats(chosen, found.arena, noises, model, {c.key for c in best.large})
 
     def causes_of(o: Option) -> tuple[tuple[Cause, bool], ...]:
         if o.refit is not None:

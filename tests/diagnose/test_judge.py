@@ -28,7 +28,27 @@ def test_a_value_with_another_sign_in_a_third_is_no_name(last, speaks):
         signatures=(own,),
     )
     noises = [fit_noise(a.evidence.residuals[0], drive.mask, np.eye(1))]
-    assert bool(repeats(refit, a, noises, Model())) is speaks
+    assert bool(repeats(refit, a, noises, Model(), {h.key})) is speaks
+    assert any("other sign" in why for why in repeats(refit, a, noises, Model(), {h.key})) is speaks
+    # too small to be named: its sign is no matter
+    assert not any("other sign" in why for why in repeats(refit, a, noises, Model(), {"another"}))
+
+
+def test_a_value_at_its_bound_is_no_name():
+    a = arena(3)
+    drive, own = a.evidence.drives[0], a.evidence.signatures[0][:1]
+    h = a.evidence.asked[0]
+    high = h.parameter(h.free[0]).high
+    refit = SimpleNamespace(
+        members=(h,),
+        names=((0, h.free[0]),),
+        values=np.array([high]),
+        residuals=(a.evidence.residuals[0],),
+        signatures=(own,),
+    )
+    noises = [fit_noise(a.evidence.residuals[0], drive.mask, np.eye(1))]
+    assert "a value stands at its physical bound." in repeats(refit, a, noises, Model(), {h.key})
+    assert "a value stands at its physical bound." not in repeats(refit, a, noises, Model(), set())
 
 
 def test_probabilities_rise_with_the_share_of_the_posterior():
