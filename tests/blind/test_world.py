@@ -83,9 +83,6 @@ def hide(effect, where=None, **values):
     return (Hidden(effect, where, values),)
 
 
-# mechanics
-
-
 # every car and every programme, not every pair of them
 TOGETHER = [(p, list(CARS)[i % len(CARS)]) for i, p in enumerate(PROGRAMMES)]
 TOGETHER += [("mixed", car) for car in CARS if ("mixed", car) not in TOGETHER]
@@ -176,9 +173,6 @@ def test_drives_are_drives(programme, vehicle):
     assert np.abs(wheels(rows, "slip")[:, of(rows, "v_x") > 3.0]).max() < 0.08
     driven = wheels(rows, "torque").max(axis=1) > 30.0
     assert {w for w, d in zip(WHEELS, driven, strict=True) if d} == set(CARS[vehicle].driven)
-
-
-# effects
 
 
 @pytest.mark.parametrize("effect", POOLS)
@@ -469,9 +463,6 @@ def test_compounds_add_up():
     assert all(len({h.effect for h in c}) == len(c) for c in (*COMPOUNDS, *TRIPLES))
 
 
-# driver
-
-
 def test_the_driver_reacts_to_what_is_hidden():
     spec = Spec("motorway", "white", hide("head_wind", speed=8.0), seed=3, duration_s=120.0)
     rows, nominal = rows_of(spec), rows_of(replace(spec, hidden=()))
@@ -493,9 +484,6 @@ def test_drivers_differ_and_stray_from_their_programme():
     assert np.std(of(first, "v_x") - of(second, "v_x")) > 1.0
     target = cases.speed_programme("mixed", cases._drive_seed(spec, 0), SHORT, pull=2.9)[: len(first)]
     assert 0.1 < np.std(of(first, "v_x") - target) < 2.0
-
-
-# noise
 
 
 def noise_of(kind, name, seed=3, programme="mixed", **given):
@@ -577,9 +565,6 @@ def test_series_sensors_have_series_noise():
     T = np.abs(of(rows, "torque_rl"))
     assert np.std(x[T < 30]) == pytest.approx(3.0, rel=0.05)
     assert np.std(x[T > 300]) == pytest.approx(np.hypot(3.0, 0.01 * np.sqrt(np.mean(T[T > 300] ** 2))), rel=0.1)
-
-
-# the interface
 
 
 def test_a_case_is_a_function_of_its_spec():

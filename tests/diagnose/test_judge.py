@@ -12,43 +12,35 @@ from aqualog.model.term import Model
 from tests.diagnose.test_unexplained import arena
 
 
+def speaking(a, value, before, names):
+    """What speaks against names of a set of one effect, fitted with this value to a residual."""
+    own, h = a.evidence.signatures[0][:1], a.evidence.asked[0]
+    refit = SimpleNamespace(
+        members=(h,), names=((0, h.free[0]),), values=np.array([value]), residuals=(before - value * own[0],),
+        signatures=(own,),
+    )  # fmt: skip
+    noises = [fit_noise(a.evidence.residuals[0], a.evidence.drives[0].mask, np.eye(1))]
+    return repeats(refit, a, noises, Model(), names)
+
+
 @pytest.mark.parametrize(("last", "speaks"), [(1.0, False), (-1.5, True)])
 def test_a_value_with_another_sign_in_a_third_is_no_name(last, speaks):
     a = arena(3)
-    n = 2400
-    third = np.where(np.arange(n) < 1600, 1.0, last)
-    drive, own = a.evidence.drives[0], a.evidence.signatures[0][:1]
-    before = a.evidence.residuals[0] + 0.4 * third * own[0]
-    h = a.evidence.asked[0]
-    refit = SimpleNamespace(
-        members=(h,),
-        names=((0, h.free[0]),),
-        values=np.array([0.4]),
-        residuals=(before - 0.4 * own[0],),
-        signatures=(own,),
-    )
-    noises = [fit_noise(a.evidence.residuals[0], drive.mask, np.eye(1))]
-    assert bool(repeats(refit, a, noises, Model(), {h.key})) is speaks
-    assert any("other sign" in why for why in repeats(refit, a, noises, Model(), {h.key})) is speaks
+    third = np.where(np.arange(2400) < 1600, 1.0, last)
+    before = a.evidence.residuals[0] + 0.4 * third * a.evidence.signatures[0][0]
+    found = speaking(a, 0.4, before, {a.evidence.asked[0].key})
+    assert bool(found) is any("other sign" in why for why in found) is speaks
     # too small to be named: its sign is no matter
-    assert not any("other sign" in why for why in repeats(refit, a, noises, Model(), {"another"}))
+    assert not any("other sign" in why for why in speaking(a, 0.4, before, {"another"}))
 
 
 def test_a_value_at_its_bound_is_no_name():
     a = arena(3)
-    drive, own = a.evidence.drives[0], a.evidence.signatures[0][:1]
     h = a.evidence.asked[0]
     high = h.parameter(h.free[0]).high
-    refit = SimpleNamespace(
-        members=(h,),
-        names=((0, h.free[0]),),
-        values=np.array([high]),
-        residuals=(a.evidence.residuals[0],),
-        signatures=(own,),
-    )
-    noises = [fit_noise(a.evidence.residuals[0], drive.mask, np.eye(1))]
-    assert "a value stands at its physical bound." in repeats(refit, a, noises, Model(), {h.key})
-    assert "a value stands at its physical bound." not in repeats(refit, a, noises, Model(), set())
+    before = a.evidence.residuals[0] + high * a.evidence.signatures[0][0]
+    assert speaking(a, high, before, {h.key}) == ("a value stands at its physical bound.",)
+    assert speaking(a, high, before, set()) == ()
 
 
 def test_probabilities_rise_with_the_share_of_the_posterior():

@@ -29,7 +29,7 @@ def few(monkeypatch):
     monkeypatch.setattr(outcome, "repeats", lambda *_: ())
 
 
-def option(evidence=SURE, sharp=0.0, signatures=S, at_bound=False, **values):
+def option(evidence=SURE, sharp=0.0, signatures=S, **values):
     """A refitted set: key (`tyre_radius_fl` for `tyre_radius@fl`) to absolute value, each with an sd of a tenth."""
     index = [next(i for k, i in AT.items() if k.replace("@", "_") == name) for name in values]
     members = tuple(ASKED[i] for i in index)
@@ -37,7 +37,7 @@ def option(evidence=SURE, sharp=0.0, signatures=S, at_bound=False, **values):
     names = tuple((k, h.free[0]) for k, h in enumerate(members))
     neutral = np.array([h.parameter(h.free[0]).neutral for h in members])
     cov = np.diag((0.1 * (x - neutral)) ** 2)
-    r = Refit(members, names, x, cov, 0.0, Model(), (LEFT,), (signatures[index],), at_bound, sharp)
+    r = Refit(members, names, x, cov, 0.0, Model(), (LEFT,), (signatures[index],), False, sharp)
     blocks = tuple(next(b for b, block in enumerate(ARENA.blocks) if block.tag == i) for i in index)
     return Option(blocks, evidence, r)
 
@@ -162,10 +162,6 @@ def test_a_failed_check_forbids_a_name(monkeypatch):
     assert o.verdict == "cannot_tell"
     assert o.small[-1].startswith("Not named: it has")
     assert o.certain == frozenset()
-
-
-def test_a_value_at_its_bound_is_no_name():
-    assert told(option(at_bound=True, payload_mass=200.0)).verdict == "cannot_tell"
 
 
 def test_what_is_certain_is_not_called_open():
