@@ -17,7 +17,6 @@ from aqualog.model.term import Model
 __all__ = ["repeats"]
 
 THIRDS = 3
-TINY = 1e-12
 SEEN = 2.0  # standard deviations at which a third of the drive says something of a value
 
 
@@ -50,11 +49,7 @@ def repeats(
     if total <= 0.0:
         every = ", ".join(name_of(h.effect.name, h.where) for h in refit.members)
         out.append(f"{every}: two thirds of the drive do not predict the other third better with it.")
-    named = [
-        (refit.members[i].parameter(n), v) for (i, n), v in zip(refit.names, refit.values, strict=True)
-        if refit.members[i].key in names
-    ]  # fmt: skip
-    if any(v <= p.low + TINY or v >= p.high - TINY for p, v in named):
+    if any(at and refit.members[i].key in names for (i, _), at in zip(refit.names, refit.bounded, strict=True)):
         out.append("a value stands at its physical bound.")
     return tuple(out)
 

@@ -34,8 +34,8 @@ class Refit:
 
     `values` (k,) absolute, `covariance` (k, k) without inflation, `loss` the sum of squares in the metric of noise and
     tolerances, plus the penalty of values beyond their usual sizes; `residuals` (C, n) and `signatures` (k, C, n) per
-    drive at these values; `at_bound` if a value sits at its physical bound; `unlikely`: the share of `loss` due to that
-    penalty; `apart` (k,): standard deviations by which the car's drives differ, in `covariance`.
+    drive at these values; `bounded` (k,): whether a value sits at its physical bound; `unlikely`: the share of `loss`
+    due to that penalty; `apart` (k,): standard deviations by which the car's drives differ, in `covariance`.
     """
 
     members: tuple[Hypothesis, ...]
@@ -46,9 +46,14 @@ class Refit:
     model: Model
     residuals: tuple[FloatArray, ...]
     signatures: tuple[FloatArray, ...]
-    at_bound: bool
+    bounded: tuple[bool, ...]
     unlikely: float = 0.0
     apart: FloatArray | None = None
+
+    @property
+    def at_bound(self) -> bool:
+        """Whether any value sits at its physical bound."""
+        return any(self.bounded)
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,7 +185,7 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
     slopes = _slopes(evidence, members, residuals, extended)
     J = measure.rows(slopes)
     covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0)) + np.diag(measure.apart[columns] ** 2)
-    at_bound = bool(np.any((values <= low + 1e-12) | (values >= high - 1e-12)))
+    bounded = tuple(bool(x) for x in (values <= low + 1e-12) | (values >= high - 1e-12))
     unlikely = _unlikely((values - base) / evidence.prior[columns])
     loss += unlikely - float((((values - base) / width) ** 2).sum())
     return Refit(
@@ -192,7 +197,7 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
         extended,
         tuple(residuals),
         slopes,
-        at_bound,
+        bounded,
         unlikely,
         measure.apart[columns],
     )

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from string import Formatter
 
 from aqualog.core.units import displayed_unit
+from aqualog.diagnose.probability import SURE
 from aqualog.diagnose.records import Cause, Estimate
 from aqualog.model.term import Effect, Term
 
@@ -100,8 +101,10 @@ def verdict_sentence(
     if verdict == "compound":
         return f"{len(causes)} effects together: {listed(names)}."
     if verdict == "cannot_tell":
-        sure = [name_of(c.effect, c.where) for c in causes if c.effect in certain]
-        open_ones = [name_of(c.effect, c.where) for c in causes if c.effect not in certain]
+        # a road's mean slope may be open although the road itself is certain
+        is_sure = [c.effect in certain and not c.probability < SURE for c in causes]
+        sure = [n for n, yes in zip(names, is_sure, strict=True) if yes]
+        open_ones = [f"{n} (mean)" if n in sure else n for n, yes in zip(names, is_sure, strict=True) if not yes]
         if sure and open_ones:
             others = listed(open_ones, "or")
             return f"Certain: {listed(sure)}. This {source} cannot distinguish the other causes: {others}."

@@ -12,12 +12,12 @@ from aqualog.model.term import Model
 from tests.diagnose.test_unexplained import arena
 
 
-def speaking(a, value, before, names):
+def speaking(a, value, before, names, *, at_bound=False):
     """What speaks against names of a set of one effect, fitted with this value to a residual."""
     own, h = a.evidence.signatures[0][:1], a.evidence.asked[0]
     refit = SimpleNamespace(
         members=(h,), names=((0, h.free[0]),), values=np.array([value]), residuals=(before - value * own[0],),
-        signatures=(own,),
+        signatures=(own,), bounded=(at_bound,),
     )  # fmt: skip
     noises = [fit_noise(a.evidence.residuals[0], a.evidence.drives[0].mask, np.eye(1))]
     return repeats(refit, a, noises, Model(), names)
@@ -36,11 +36,10 @@ def test_a_value_with_another_sign_in_a_third_is_no_name(last, speaks):
 
 def test_a_value_at_its_bound_is_no_name():
     a = arena(3)
-    h = a.evidence.asked[0]
-    high = h.parameter(h.free[0]).high
-    before = a.evidence.residuals[0] + high * a.evidence.signatures[0][0]
-    assert speaking(a, high, before, {h.key}) == ("a value stands at its physical bound.",)
-    assert speaking(a, high, before, set()) == ()
+    before = a.evidence.residuals[0] + 0.4 * a.evidence.signatures[0][0]
+    key = a.evidence.asked[0].key
+    assert speaking(a, 0.4, before, {key}, at_bound=True) == ("a value stands at its physical bound.",)
+    assert speaking(a, 0.4, before, {"another"}, at_bound=True) == speaking(a, 0.4, before, {key}) == ()
 
 
 def test_probabilities_rise_with_the_share_of_the_posterior():

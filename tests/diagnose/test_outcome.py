@@ -37,7 +37,7 @@ def option(evidence=SURE, sharp=0.0, signatures=S, **values):
     names = tuple((k, h.free[0]) for k, h in enumerate(members))
     neutral = np.array([h.parameter(h.free[0]).neutral for h in members])
     cov = np.diag((0.1 * (x - neutral)) ** 2)
-    r = Refit(members, names, x, cov, 0.0, Model(), (LEFT,), (signatures[index],), False, sharp)
+    r = Refit(members, names, x, cov, 0.0, Model(), (LEFT,), (signatures[index],), (False,) * len(index), sharp)
     blocks = tuple(next(b for b, block in enumerate(ARENA.blocks) if block.tag == i) for i in index)
     return Option(blocks, evidence, r)
 
@@ -164,6 +164,13 @@ def test_a_failed_check_forbids_a_name(monkeypatch):
     assert o.certain == frozenset()
 
 
+def test_only_what_is_worth_naming_is_asked_whether_it_repeats(monkeypatch):
+    asked = []
+    monkeypatch.setattr(outcome, "repeats", lambda *given: asked.append(set(given[-1])) or ())
+    assert told(option(payload_mass=200.0, head_wind=1e-6)).verdict == "named"
+    assert asked == [{"payload_mass"}]
+
+
 def test_what_is_certain_is_not_called_open():
     from aqualog.diagnose.records import Cause
     from aqualog.diagnose.words import verdict_sentence
@@ -171,5 +178,8 @@ def test_what_is_certain_is_not_called_open():
     causes = [Cause(n, None, {}, (), "") for n in ("payload_mass", "aero_drag", "head_wind")]
     said = verdict_sentence("cannot_tell", causes, level=0.01, certain=frozenset({"payload_mass"}))
     assert said == "Certain: payload mass. This log cannot distinguish the other causes: aero drag or head wind."
+    road, mean = (Cause("road_grade", None, {}, (), "", p) for p in (1.0, 0.5))
+    said = verdict_sentence("cannot_tell", [mean, causes[1], road], level=0.01, certain=frozenset({"road_grade"}))
+    assert said == "Certain: road grade. This log cannot distinguish the other causes: road grade (mean) or aero drag."
     both = verdict_sentence("cannot_tell", causes[1:], level=0.01)
     assert both == "The car differs from the model, but this log cannot distinguish aero drag and head wind."
