@@ -40,6 +40,7 @@ __all__ = [
 
 # of an effect at any place, of a shape of a mechanism, and of a road that is not even, on one drive (K)
 KNOWN_PRIOR, SHAPE_PRIOR, ROAD_PRIOR = 0.03, 0.01, 0.2
+MOMENTS = 10  # that differ, of which the one that explains most competes
 MOST_BLOCKS = 12000  # of 0.1 s that compete; a longer drive does with its best 20 min
 FORCE_N = 100.0  # of the force whose response stands for any force
 TOLERATED = ("v_x", "torque", "a_y", "a_x")  # coordinates along which a car and its simulation differ anyway
@@ -107,7 +108,7 @@ class Arena:
             rows[:k] *= self.sd[:k, None].astype(np.float32)
             for b in (*self.blocks, *self.forgiven):
                 if b.kind != "effect":
-                    rows[list(b.columns)] = w.rows(self.drawn(i, b))
+                    rows[list(b.columns)] = w.single(self.drawn(i, b))
             rows[-1] = w.rows(p.residual[None])[0]
             total += products(rows)
         return total
@@ -256,9 +257,10 @@ def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, .
         if h.allowed or evidence.barred[i]:
             continue
         c = list(columns)
+        moments = MOMENTS if h.effect.drive.begins_like and "start" in h.fixed and len(evidence.drives) == 1 else 1
         out.append(
             Block(
-                h.key, "effect", columns, np.eye(len(c)), math.log(KNOWN_PRIOR / places[h.effect.name]), i,
+                h.key, "effect", columns, np.eye(len(c)), math.log(KNOWN_PRIOR / places[h.effect.name] / moments), i,
                 evidence.low[c] / evidence.prior[c], evidence.high[c] / evidence.prior[c],
             )
         )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,11 +11,11 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena, products
 from aqualog.diagnose.competition import COARSE, Block, State
 from aqualog.diagnose.evidence import Evidence, forgiving
-from aqualog.diagnose.hypotheses import THREADS
 from aqualog.diagnose.noise import Spectra, bridged, spectra
 from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, evidence_of, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
+from aqualog.diagnose.threads import beside
 
 __all__ = ["Fitted", "Members", "Posterior", "compete", "fitted", "rule"]
 
@@ -56,7 +55,7 @@ class _Noise:
 
 @dataclass(frozen=True, slots=True)
 class _Deviations:
-    """What cars and files differ by anyway along each part, as transforms of few columns of independent unit values."""
+    """What cars and files differ by anyway along each part: transforms of few columns of independent unit values."""
 
     arena: Arena
     columns: tuple[Spectra, ...]
@@ -74,18 +73,18 @@ def compete(arena: Arena) -> Posterior:
     deviations = _deviations(arena, white)
     noise = _beside(deviations, (), None)
     gram = arena.inner(noise.weighings)
+    known: dict[Members, _Noise] = {}  # after sets of the metric of white noise, which stays
     for _ in range(ROUNDS):
         tolerant = arena.tolerant(gram)
         sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram), width=ROUGHLY)
         best = max(sets, key=lambda k: sets[k])
-        starts = [(m, fitted(arena, tolerant, m)) for m in _first(arena, tolerant, best)]
-        coloured = len(starts)
-        others = [*_first(arena, whitely, best), *_first(arena, whitely, ())[1:]]
-        starts += [(m, fitted(arena, whitely, m)) for m in dict.fromkeys(others)]
-        with ThreadPoolExecutor(THREADS) as pool:
-            tried = list(pool.map(lambda s: _beside(deviations, *s), starts))
+        coloured = [(m, fitted(arena, tolerant, m)) for m in _first(arena, tolerant, best)]
+        others = dict.fromkeys([*_first(arena, whitely, best), *_first(arena, whitely, ())[1:]])
+        new = [(m, fitted(arena, whitely, m)) for m in others if m not in known]
+        tried = beside(lambda s: _beside(deviations, *s), [*coloured, *new])
+        known |= {n.members: n for n in tried[len(coloured) :]}
         # white noise is wrong: a second step is fairer
-        tried.append(_after(deviations, max(tried[coloured:], key=lambda n: n.likely)))
+        tried += [_after(deviations, max((known[m] for m in others), key=lambda n: n.likely))]
         better = max(tried, key=lambda n: n.likely)
         if better.likely < noise.likely + CLEARLY:
             break
@@ -110,7 +109,7 @@ def _deviations(arena: Arena, white: FloatArray) -> _Deviations:
     w, V = np.linalg.eigh(root.T @ white[np.ix_(k, k)] @ root)
     values = np.zeros((int((w > NEGLIGIBLE).sum()), arena.width))
     values[:, k] = (root @ V[:, w > NEGLIGIBLE]).T
-    drawn = (spectra(bridged(arena.made(i, values), p.mask)) for i, p in enumerate(arena.parts))
+    drawn = (spectra(bridged(arena.made(i, values).astype(np.float32), p.mask)) for i, p in enumerate(arena.parts))
     return _Deviations(arena, tuple(drawn))
 
 

@@ -1,7 +1,7 @@
-"""Intervals and waves: unknown forms of few values over time and place.
+"""Intervals, patches and waves: unknown forms of few values over time and place.
 
-A smooth function of time with a dozen values cannot be distinguished from slow noise. An offset that begins and ends,
-or a wave of one length, says the same with two or three values, which slow noise cannot do.
+A smooth function of time with a dozen values cannot be distinguished from slow noise. Offsets that begin and end, a
+patch that comes again, or a wave of one length, say the same with few values, which slow noise cannot do.
 """
 
 from __future__ import annotations
@@ -20,12 +20,11 @@ from aqualog.diagnose.competition import Block
 from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.shapes import MECHANISMS, Mechanism, Shape
 from aqualog.diagnose.spline import POINTS, Basis
+from aqualog.diagnose.steps import EDGES, OUTLIER, gain_of, intervals, trapezoid
 
 __all__ = ["with_elements"]
 
-EDGES = 75  # of intervals, evenly over the drive
-OUTLIER = 6.0  # of the median size (4 standard deviations), beyond which a sample counts no more
-SHORTEST = 3  # edges from the begin of an interval to its end
+AGAIN, AGAIN_STEP, PHASES = (1.5, 25.0), 0.03, 40  # times that patches come again over a drive; phases of one turn
 # waves: from half a period over the drive to ... periods, in steps of ...
 PERIODS, STEP = 150.0, 0.5
 SAMPLES_A_WAVE = 6.0  # least
@@ -66,7 +65,9 @@ def with_elements(arena: Arena) -> Arena:
         weight = np.where(used, (response**2).sum(axis=0), 0.0)
         score = np.where(used, (response * left).sum(axis=0), 0.0)
         found = [_wave(n, along[n], weight, score, used) for n in names]
-        found.append(_interval(along["t"], weight, score))
+        several = intervals(weight, score)
+        found += [_stepped(along["t"], several[:k], weight, score) for k in sorted({1, len(several)} - {0})]
+        found += [_patches(n, along[n], weight, score) for n in names]
         made += [(m, f) for f in found if f is not None]
     return _extended(arena, made)
 
@@ -92,52 +93,70 @@ def _extended(arena: Arena, made: Sequence[tuple[Mechanism, _Found]]) -> Arena:
     )  # fmt: skip
 
 
-def _interval(t: FloatArray, weight: FloatArray, score: FloatArray) -> _Found | None:
-    """The offset that begins and ends, suddenly or slowly, and explains most beside a constant."""
-    A = np.concatenate([[0.0], np.cumsum(weight)])
-    B = np.concatenate([[0.0], np.cumsum(score)])
-    at = np.linspace(0, t.size, EDGES + 1).astype(np.intp)
-    i, j = np.triu_indices(EDGES + 1, SHORTEST)
-    usable = i + EDGES - j >= SHORTEST
-    i, j = at[i[usable]], at[j[usable]]
-    a, b = A[j] - A[i], B[j] - B[i]
-    rest = np.maximum(a * (1.0 - a / A[-1]), 1e-9 * A[-1])
-    best = int(np.argmax((b - a / A[-1] * B[-1]) ** 2 / rest))
-    low, high, rise = int(i[best]), int(j[best]), 0
-    inside = (low > 0, high < t.size)
-    gain = 0.0
-    step = int(at[1])
-    shortest = SHORTEST * step
-    while step >= 1:
-        moves = [(d * inside[0], e * inside[1], r) for d in (-step, 0, step) for e in (-step, 0, step)
-                 for r in (-step, 0, step)]  # fmt: skip
-        tried = [(low + d, high + e, max(rise + r, 0)) for d, e, r in moves]
-        each = [_gain(_trapezoid(t.size, *x), weight, score) if x[1] - x[0] >= shortest else 0.0 for x in tried]
+def _stepped(
+    t: FloatArray, edges: Sequence[tuple[int, int, int]], weight: FloatArray, score: FloatArray
+) -> _Found:  # fmt: skip
+    """Intervals over time as a form of one value each."""
+    columns = np.array([trapezoid(t.size, *x) for x in edges]).T
+    points = np.linspace(t[0], t[-1], 4 * POINTS)
+    at = np.array([np.interp(points, t, c) for c in columns.T]).T
+    basis = Basis(("t",), columns, np.eye(len(edges)), points[:, None], at, np.ones(points.size, dtype=bool))
+    said = []
+    for low, high, _ in sorted(edges):
+        begin, end = (f"{t[min(i, t.size - 1)]:.0f} s" for i in (low, high))
+        inside = f"from {begin} to {end}" if low > 0 else f"until {end}"
+        said.append(inside if high < t.size else f"from {begin} on")
+    kind = "interval" if len(edges) == 1 else "intervals"
+    gain = gain_of(columns.T, weight, score)
+    return _Found(kind, " and ".join(said), gain, basis, (0.5 * EDGES**2) ** len(edges))
+
+
+def _patches(name: str, x: FloatArray, weight: FloatArray, score: FloatArray) -> _Found | None:
+    """The offset that comes again after equal ways, or times, and explains most beside a constant."""
+    if not np.isfinite(x).all() or np.ptp(x) <= 0.0:
+        return None
+    low, span = float(x.min()), float(np.ptp(x))
+    rate = np.arange(*AGAIN, AGAIN_STEP)
+    i, j = (k.ravel() for k in np.meshgrid(np.arange(PHASES), np.arange(1, PHASES // 2 + 1), indexing="ij"))
+    total, right = weight.sum(), score.sum()
+    best: tuple[float, tuple[float, float, float]] = (0.0, (0.0, 0.0, 0.0))
+    for f in rate.tolist():
+        # phases of one turn, twice: a patch may begin at the end of a turn
+        at = (np.mod((x - low) / span * f, 1.0) * PHASES).astype(np.intp)
+        folded = (np.tile(np.bincount(at, v, PHASES), 2) for v in (weight, score))
+        A, B = (np.concatenate([[0.0], np.cumsum(v)]) for v in folded)
+        a, b = A[i + j] - A[i], B[i + j] - B[i]
+        each = (b - a / total * right) ** 2 / np.maximum(a * (1.0 - a / total), 1e-9 * total)
+        k = int(np.argmax(each))
+        if each[k] > best[0]:
+            period = span / f
+            best = float(each[k]), (low + i[k] / PHASES * period, j[k] / PHASES * period, period)
+
+    def column(v: tuple[float, float, float]) -> FloatArray:
+        return np.asarray(np.mod(x - v[0], v[2]) < v[1], dtype=np.float64)
+
+    now = best[1]
+    gain, step = 0.0, now[1] / 4.0
+    while step > 0.01 * now[1]:
+        tried = [(now[0] + p * step, now[1] + q * step, now[2] + r * step / AGAIN[1])
+                 for p in (-1, 0, 1) for q in (-1, 0, 1) for r in (-1, 0, 1)]  # fmt: skip
+        each = np.array([gain_of(column(v), weight, score) if 0.0 < v[1] < v[2] else 0.0 for v in tried])
         k = int(np.argmax(each))
         if each[k] <= gain * (1.0 + 1e-9):
-            step //= 2
+            step *= 0.5
         else:
-            gain, (low, high, rise) = each[k], tried[k]
+            gain, now = float(each[k]), tried[k]
     if gain <= 0.0:
         return None
-    column = _trapezoid(t.size, low, high, rise)
-    points = np.linspace(t[0], t[-1], 4 * POINTS)
-    at_points = np.interp(points, t, column)[:, None]
-    basis = Basis(("t",), column[:, None], np.eye(1), points[:, None], at_points, np.ones(points.size, dtype=bool))
-    begin, end = (f"{t[min(i, t.size - 1)]:.0f} s" for i in (low, high))
-    manner = (
-        f"from {begin} to {end}" if low > 0 and high < t.size else f"from {begin} on" if low > 0 else f"until {end}"
+    start, length, period = now
+    own = column(now)
+    points = np.linspace(low, low + span, 8 * POINTS)
+    at_points = np.asarray(np.mod(points - start, period) < length, dtype=np.float64)
+    basis = Basis(
+        (name,), own[:, None], np.eye(1), points[:, None], at_points[:, None], np.ones(points.size, dtype=bool)
     )
-    return _Found("interval", manner, gain, basis, 0.5 * EDGES**2)
-
-
-def _trapezoid(n: int, low: int, high: int, rise: int) -> FloatArray:
-    """One from `low` to `high`, with slopes of `rise` samples about both ends; no slope at the drive's own ends."""
-    k = np.arange(n) + 0.5
-    width = max(rise, 1)
-    up = np.clip((k - low) / width + 0.5, 0.0, 1.0) if low > 0 else np.ones(n)
-    down = np.clip((high - k) / width + 0.5, 0.0, 1.0) if high < n else np.ones(n)
-    return np.asarray(np.minimum(up, down))
+    unit = "m" if name == "position" else "s"
+    return _Found("patches", f"for {length:.3g} {unit} in every {period:.4g} {unit}", gain, basis, rate.size * i.size)
 
 
 def _wave(name: str, x: FloatArray, weight: FloatArray, score: FloatArray, used: BoolArray) -> _Found | None:
@@ -151,12 +170,12 @@ def _wave(name: str, x: FloatArray, weight: FloatArray, score: FloatArray, used:
     most = min(PERIODS, float(known.sum()) / SAMPLES_A_WAVE)
     best: tuple[float, float] = (0.0, 0.0)
     for f in np.arange(LEAST_PERIODS, most, STEP):
-        gain = _gain(_circle(2.0 * np.pi * f * z), w, s)
+        gain = gain_of(_circle(2.0 * np.pi * f * z), w, s)
         best = max(best, (gain, float(f)))
     if best[0] <= 0.0:
         return None
     for f in best[1] + STEP * np.linspace(-0.8, 0.8, 9):
-        best = max(best, (_gain(_circle(2.0 * np.pi * f * z), w, s), float(f)))
+        best = max(best, (gain_of(_circle(2.0 * np.pi * f * z), w, s), float(f)))
     phase = 2.0 * np.pi * best[1] * z
     columns = np.where(known, _circle(phase), 0.0).T
     points = np.linspace(0.0, 1.0, max(POINTS, min(1200, int(12 * best[1]))))
@@ -170,11 +189,3 @@ def _wave(name: str, x: FloatArray, weight: FloatArray, score: FloatArray, used:
 
 def _circle(phase: FloatArray) -> FloatArray:
     return np.stack([np.cos(phase), np.sin(phase)])
-
-
-def _gain(columns: FloatArray, weight: FloatArray, score: FloatArray) -> float:
-    """What columns (k, n) or (n,) explain beside a constant."""
-    X = np.vstack([np.ones(weight.size), columns])
-    gram, right = (X * weight) @ X.T, X @ score
-    gram += 1e-9 * np.trace(gram) * np.eye(len(X))
-    return float(right @ np.linalg.solve(gram, right) - right[0] ** 2 / gram[0, 0])

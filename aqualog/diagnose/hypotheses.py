@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,14 +13,14 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.channels import channel_values
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.lanes import stretches
+from aqualog.diagnose.threads import beside
 from aqualog.diagnose.tolerances import LANE_TOLERANCES, STAND_IN, TOLERANCES
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import STEP_S, follow
 from aqualog.model.term import Effect, Model, Need, Parameter, Term
 
-__all__ = ["THREADS", "Hypothesis", "hypotheses", "residual", "signatures", "simulated", "value_in", "with_values"]
+__all__ = ["Hypothesis", "hypotheses", "residual", "signatures", "simulated", "value_in", "with_values"]
 
-THREADS = 2
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
 WORTH = 2.0  # tolerances
 ROUGH_S = 1e-2  # [s] step that is enough for differences of simulations on dry road
@@ -103,6 +102,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     for effect in EFFECTS.values():
         if effect.drive.at_full_rate:
             continue
+        is_sought = bool(effect.drive.begins_like) and len(drives) == 1  # see `moments`
         missing = next((need for need in effect.drive.needs if not has[need]), None)
         if missing is not None:
             untested[effect.name] = f"no {missing} in the log"
@@ -112,7 +112,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         asked = [w for w in places if _has_signal(w, present, torque=torque)]
         if not asked:
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
-        for where in asked:
+        for where in () if is_sought else asked:
             out += [Hypothesis(effect, where, free, fixed) for fixed in effect.drive.variants(length)]
     out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(() if torque else (STAND_IN,)))]
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
@@ -234,8 +234,7 @@ def signatures(
         return np.array(out)
 
     alone = {i: h for i, h in enumerate(asked) if h.lane is None and (each or not _sums(h))}
-    with ThreadPoolExecutor(THREADS) as pool:
-        done = dict(zip(alone, pool.map(one, alone.values()), strict=True))
+    done = dict(zip(alone, beside(one, alone.values()), strict=True))
     by_wheel: dict[tuple[str, str | None, tuple[tuple[str, float], ...]], FloatArray] = {
         (asked[i].effect.name, asked[i].where, tuple(asked[i].fixed.items())): x for i, x in done.items()
     }

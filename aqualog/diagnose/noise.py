@@ -74,7 +74,7 @@ class Spectra:
 
 
 def bridged(x: FloatArray, mask: BoolArray) -> FloatArray:
-    """Masked samples by straight lines between usable ones. (..., n)"""
+    """Masked samples by straight lines between usable ones, in the precision of x. (..., n)"""
     if mask.all():
         return x
     good = np.flatnonzero(mask)
@@ -84,13 +84,14 @@ def bridged(x: FloatArray, mask: BoolArray) -> FloatArray:
     after = np.searchsorted(good, bad)
     left, right = good[np.maximum(after - 1, 0)], good[np.minimum(after, good.size - 1)]
     share = np.clip((bad - left) / np.maximum(right - left, 1), 0.0, 1.0)
-    out = np.array(x, dtype=np.float64)
+    share = share.astype(x.dtype)
+    out = x.copy()
     out[..., bad] = (1.0 - share) * x[..., left] + share * x[..., right]
     return out
 
 
 def spectra(x: FloatArray) -> Spectra:
-    """Transforms of arrays (k, C, n), bridged. Their first second replaces the unknown past before the log."""
+    """Transforms of arrays (k, C, n), bridged, in their precision; their first second replaces the unknown past."""
     n = x.shape[-1]
     past = np.repeat(x[..., :10].mean(axis=-1, keepdims=True), MEMORY, axis=-1)
     size = good_size(n + 2 * MEMORY + 1)
@@ -233,11 +234,13 @@ def whitened(x: Spectra, noise: Noise) -> FloatArray:
 
     Inner products of whitened arrays are in units of twice the log-likelihood; masked samples are zero.
     """
-    filters = np.fft.rfft(noise.taps, x.size)
+    kind = x.values.dtype
+    filters = np.fft.rfft(noise.taps, x.size).astype(x.transform.dtype)
+    rotation, weights, shaping = (a.astype(kind) for a in (noise.rotation, noise.weights, noise.shaping))
     k = x.transform.shape[0]
-    out = np.empty((k, noise.taps.shape[0], x.n))
+    out = np.empty((k, noise.taps.shape[0], x.n), dtype=kind)
     for i in range(k):
-        z = (noise.rotation @ x.transform[i]) * filters
+        z = (rotation @ x.transform[i]) * filters
         e = np.fft.irfft(z, x.size)[:, MEMORY : MEMORY + x.n]
-        out[i] = noise.shaping @ (e * noise.weights)
+        out[i] = shaping @ (e * weights)
     return out.reshape(k, out.shape[1] * x.n)

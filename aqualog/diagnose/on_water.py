@@ -8,7 +8,6 @@ does. So the effects of water are simulated at several sizes each, and signature
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -19,8 +18,9 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import rolling_under
 from aqualog.diagnose.evidence import Evidence
-from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in, with_values
+from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
 from aqualog.diagnose.spectrum import weighing
+from aqualog.diagnose.threads import beside
 from aqualog.model.term import Model
 
 __all__ = ["around_water", "of_water"]
@@ -63,8 +63,7 @@ def around_water(evidence: Evidence, model: Model) -> Evidence:
         return _Tried(_surprise(evidence, residuals), i, off, residuals)
 
     def best_of(points: Sequence[tuple[int, float]]) -> _Tried:
-        with ThreadPoolExecutor(THREADS) as pool:
-            return min([best, *(t for t in pool.map(tried, points) if t is not None)], key=lambda t: t.surprise)
+        return min([best, *(t for t in beside(tried, points) if t is not None)], key=lambda t: t.surprise)
 
     start = best = _Tried(_surprise(evidence, evidence.residuals), every[0], 0.0, evidence.residuals)
     usual = {i: evidence.prior[evidence.columns[i][0]] for i in every}

@@ -76,10 +76,19 @@ class Metric:
         found = [w.rows(each[p.drive][..., p.at]) for p, w in zip(self.parts, self.weighings, strict=True)]
         return math.sqrt(self.coarse) * np.concatenate(found, axis=1)
 
+    def single(self, each: Sequence[FloatArray]) -> NDArray[np.float32]:
+        """The same in single precision."""
+        found = [w.single(each[p.drive][..., p.at]) for p, w in zip(self.parts, self.weighings, strict=True)]
+        return np.float32(math.sqrt(self.coarse)) * np.concatenate(found, axis=1)
+
     def inner(self, u: FloatArray, w: FloatArray) -> FloatArray:
         """Inner products of rows (a, N) and (b, N): (a, b)."""
         at_u = self.across(u)
-        return np.asarray(u @ w.T - at_u @ self.M @ (at_u if w is u else self.across(w)).T)
+        out = -at_u @ self.M @ (at_u if w is u else self.across(w)).T
+        for i in range(0, u.shape[1], CHUNK):
+            x = u[:, i : i + CHUNK].astype(np.float64, copy=False)
+            out += x @ (x if w is u else w[:, i : i + CHUNK].astype(np.float64, copy=False)).T
+        return np.asarray(out)
 
     def across(self, u: FloatArray) -> FloatArray:
         """Inner products of rows (a, N) with those of the tolerances, in double precision. (a, k)"""
@@ -155,7 +164,7 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
         return None
     y, residuals, extended = found
     loss = _loss(measure, y, (values - base) / width)
-    fresh = False
+    fresh, here = False, None  # whether J still predicts; the slopes, where they were simulated at these values
     for _ in range(ROUNDS):
         P = np.diag(width**-2.0)
         G = measure.inner(J, J) + P
@@ -170,7 +179,7 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
             won = loss - _loss(measure, tried[0], (new - base) / width)
             if won > 0.0:
                 y, residuals, extended = tried
-                values, loss = new, loss - won
+                values, loss, here = new, loss - won, None
                 break
             if not fresh:
                 break
@@ -180,10 +189,11 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
         elif fresh:
             break
         if not fresh:
-            J = measure.rows(_slopes(evidence, members, residuals, extended))
-            fresh = True
-    slopes = _slopes(evidence, members, residuals, extended)
-    J = measure.rows(slopes)
+            here = _slopes(evidence, members, residuals, extended)
+            J, fresh = measure.rows(here), True
+    if here is None:
+        here = _slopes(evidence, members, residuals, extended)
+        J = measure.rows(here)
     covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0)) + np.diag(measure.apart[columns] ** 2)
     bounded = tuple(bool(x) for x in (values <= low + 1e-12) | (values >= high - 1e-12))
     unlikely = _unlikely((values - base) / evidence.prior[columns])
@@ -196,7 +206,7 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
         loss,
         extended,
         tuple(residuals),
-        slopes,
+        here,
         bounded,
         unlikely,
         measure.apart[columns],

@@ -187,7 +187,7 @@ def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
         model, ready = moved, [led_by(d, moved) for d in ready]
         evidence = simulated(ready, asked, model, tell)
     evidence = supported(around_water(evidence, model))
-    return _Setting(list(evidence.drives), model, bare, road, asked, untested, evidence, notes)
+    return _Setting(list(evidence.drives), model, bare, road, evidence.asked, untested, evidence, notes)
 
 
 def _moved(moved: Model, model: Model) -> tuple[str, ...]:

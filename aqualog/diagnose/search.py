@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,11 +22,13 @@ from aqualog.diagnose.competition import COARSE, added, forgiving, start
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import with_elements
 from aqualog.diagnose.evidence import Evidence, make_evidence, tolerant
-from aqualog.diagnose.hypotheses import THREADS, Hypothesis, residual, signatures, value_in
+from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in
+from aqualog.diagnose.moments import moments
 from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
 from aqualog.diagnose.subsets import compatible, imitations
+from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unexplained import unknown_forms
 from aqualog.diagnose.words import listed, name_of
 from aqualog.model.term import Model
@@ -85,6 +86,10 @@ def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model
     for d in drives:
         residuals.append(residual(d, model))
         all_signatures.append(signatures(d, model, asked, base=residuals[-1], tick=tick))
+    if len(drives) == 1:
+        begun = moments(drives[0], residuals[0], asked, all_signatures[0])
+        all_signatures[0] += signatures(drives[0], model, begun, base=residuals[0])
+        asked = (*asked, *begun)
     values = {(i, n): value_in(model, h, n) for i, h in enumerate(asked) for n in h.free}
     return make_evidence(drives, asked, residuals, all_signatures, values)
 
@@ -220,8 +225,7 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
             return None
         return Option(members, _evidence(arena, found, own, measure, model, nothing), found)
 
-    with ThreadPoolExecutor(THREADS) as pool:
-        done = dict(zip(chosen, pool.map(one, chosen), strict=True))
+    done = dict(zip(chosen, beside(one, chosen), strict=True))
     # water is not linear: without any effect, the simulator may differ from what signatures say of it
     y = measure.rows([residual(d, model)[None] for d in evidence.drives])
     bare = nothing - 0.5 * float(measure.inner(y, y)[0, 0])
@@ -280,9 +284,11 @@ def _evidence(
     J = measure.rows(found.signatures) * arena.sd[columns, None]
     y = measure.rows([r[None] for r in found.residuals])[0] + (off / arena.sd[columns]) @ J
     doubtful = _doubtful(arena, found, off)
-    doubts = measure.rows(doubtful) if len(doubtful[0]) else J[:0]
-    rows = np.concatenate([J, doubts, y[None]])
-    state = start(measure.inner(rows, rows))
+    doubts, exact = measure.single(doubtful), np.concatenate([J, y[None]])
+    order = [*range(len(J)), *range(len(exact), len(exact) + len(doubts)), len(J)]  # the residual last
+    shared = measure.inner(exact, doubts)
+    gram = np.block([[measure.inner(exact, exact), shared], [shared.T, measure.inner(doubts, doubts)]])
+    state = start(gram[np.ix_(order, order)])
     at = 0
     by_tag = {b.tag: b for b in arena.blocks}
     loss = 0.5 * float(state.inner[-1, -1])

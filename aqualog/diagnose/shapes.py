@@ -21,7 +21,8 @@ class Mechanism:
     """`source`: effect and place whose signature is the response, in `unit`; `usual` size of a deviation, and
     the one by which a car and its simulation differ anyway.
 
-    `over`: coordinates of its functions, alone or in pairs.
+    `over`: coordinates of its functions, alone or in pairs; `scales`: the signal that it multiplies, on which what it
+    does depends as well.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Mechanism:
     allowed: float
     over: tuple[tuple[str, ...], ...]
     is_road: bool = False  # every road has it: no unknown form
+    scales: str = ""
 
 
 ALONG = ("t", "position")
@@ -47,7 +49,7 @@ MECHANISMS: tuple[Mechanism, ...] = (
     ),
     Mechanism(
         "accelerometer_gain", "the gain of the accelerometer", "accelerometer_gain@a_x", "-", 0.05, 0.01,
-        _SENSOR,
+        _SENSOR, scales="a_x",
     ),
     Mechanism(
         "torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.01,

@@ -7,6 +7,7 @@ column under noise alone follows its chi-squared distribution. Surrogates of the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -67,15 +68,16 @@ class Weighing:
         )
 
     def single(self, x: FloatArray) -> npt.NDArray[np.float32]:
-        """The same in single precision, which takes half the memory."""
+        """The same in single precision, which takes half of memory and time."""
         out = np.empty((len(x), self.width), dtype=np.float32)
         for i in range(0, len(x), CHUNK):
-            out[i : i + CHUNK] = self.rows(x[i : i + CHUNK])
+            out[i : i + CHUNK] = self._rows(spectra(bridged(x[i : i + CHUNK].astype(np.float32), self.mask)))
         return out
 
     def _rows(self, x: Spectra) -> FloatArray:
         flat = whitened(x, self.noise).reshape(x.values.shape)
-        lines = np.matmul(self.inverse, _lines(flat[..., self.used], self.size).transpose(2, 1, 0))  # (F, C, k)
+        each = _lines(flat[..., self.used], self.size)
+        lines = np.matmul(self.inverse.astype(each.dtype), each.transpose(2, 1, 0))  # (F, C, k)
         return np.concatenate([lines.real, lines.imag]).reshape(-1, len(flat)).T
 
 
@@ -118,10 +120,10 @@ def _trusted(f: FloatArray) -> FloatArray:
 
 def _lines(x: FloatArray, size: int) -> Complex:
     """Fourier lines (..., F), scaled so that their squares sum to the signal's."""
-    lines = np.fft.rfft(x, size, axis=-1) * np.sqrt(2.0 / size)
-    lines[..., 0] *= np.sqrt(0.5)
+    lines = np.fft.rfft(x, size, axis=-1) * math.sqrt(2.0 / size)
+    lines[..., 0] *= math.sqrt(0.5)
     if size % 2 == 0:
-        lines[..., -1] *= np.sqrt(0.5)
+        lines[..., -1] *= math.sqrt(0.5)
     return np.asarray(lines)
 
 

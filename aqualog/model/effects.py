@@ -390,7 +390,8 @@ _ALL = [
             leak_radius=_changed(p.leak_radius, w, np.add, v["radius"]),
             leak_slope=_changed(p.leak_slope, w, np.add, v["slope"]), leak_start=v["start"], leak_time=v["duration"])),
         _WHEEL_PLACES, twins=("tyre_radius",),
-        drive=DriveSearch((_SPEEDS,), by_wheel=True, variants=_leaks, tolerance=1e-3), belongs="moment",
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, variants=_leaks, begins_like="tyre_radius", tolerance=1e-3),
+        belongs="moment",
     ),
     Effect(
         "tyre_radius_growth", "rolling radius over speed [s^2/m^2]", "The tyre grows with speed.",

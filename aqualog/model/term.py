@@ -67,7 +67,8 @@ class DriveSearch:
     `needs`: what a log must hold; `at_full_rate`: faster than blocks of 0.1 s, so the search leaves it out.
     `places` where it is searched, None the whole car; empty: the car, both axles where it acts on wheels, and with
     `by_wheel` every wheel. The first `count` parameters are sought; `variants` are values of the others, by the
-    length of the longest drive [s].
+    length of the longest drive [s]. Of a single drive, the response of the effect `begins_like` shows where this one
+    begins, in place of variants.
 
     `tolerance`: standard deviation that is not worth naming; None: a third of the smallest size, 0: a car has the
     effect or not; `tolerance_at` some places. `axle_key`: start of an axle's key in the vehicle file, which the first
@@ -85,6 +86,7 @@ class DriveSearch:
     by_wheel: bool = False
     count: int = 1
     variants: Callable[[float], Sequence[Mapping[str, float]]] = lambda _: ({},)
+    begins_like: str = ""
     tolerance: float | None = None
     tolerance_at: Mapping[str, float] = field(default_factory=dict)
     axle_key: str = ""

@@ -48,6 +48,25 @@ def test_a_wave_of_the_road():
     assert float(length) == pytest.approx(310.0, abs=3.0)
 
 
+@pytest.mark.parametrize(
+    ("name", "unit", "length", "period"), [("position", "m", 180.0, 1130.0), ("t", "s", 9.0, 61.0)]
+)
+def test_a_patch_that_comes_again(name, unit, length, period):
+    _, _, forms = found(12, lambda c: 250.0 * (np.mod(c[name] - 0.4 * period, period) < length))
+    assert [(r.mechanism, r.depends_on) for r in forms] == [("force", (name,))]
+    said = re.fullmatch(rf"a force on the car for (\S+) {unit} in every (\S+) {unit}", short_form(forms[0])).groups()
+    assert tuple(map(float, said)) == (pytest.approx(length, rel=0.15), pytest.approx(period, rel=0.02))
+    assert forms[0].f.max() == pytest.approx(250.0, rel=0.2)
+
+
+def test_two_forces_of_different_size():
+    truth = lambda t: 240.0 * trapezoid(t, 40.0, 72.0, 0.1) - 330.0 * trapezoid(t, 150.0, 166.0, 0.1)  # noqa: E731
+    _, _, forms = found(11, lambda c: truth(c["t"]))
+    assert [(r.mechanism, r.depends_on) for r in forms] == [("force", ("t",))]
+    assert " and from " in forms[0].manner
+    assert np.sqrt(np.mean((forms[0].f - truth(forms[0].x[:, 0])) ** 2)) < 50.0
+
+
 @pytest.mark.parametrize("seed", [13, 14, 15, 16])
 def test_slow_noise_is_no_form(seed):
     """Of the size of the forms above, with a memory of 20 s."""
@@ -70,8 +89,9 @@ def test_a_known_effect_beside_an_interval():
 
 def test_the_blocks_pay_for_all_that_were_tried():
     a = with_elements(arena(18))
-    own = [b for b in a.blocks if "wave" in b.key or "interval" in b.key]
-    assert {b.key for b in own} == {"force(wave of t)", "force(wave of position)", "force(interval of t)"}
+    own = [b for b in a.blocks if " of " in b.key]
+    kinds = ("wave of t", "wave of position", "interval of t", "intervals of t", "patches of t", "patches of position")
+    assert {b.key for b in own} == {f"force({k})" for k in kinds}
     smooth = max(b.log_prior for b in a.blocks if b.kind == "shape" and b not in own)
     assert max(b.log_prior for b in own) < smooth - 3.0
     assert all(a.sd[list(b.columns)].tolist() == [150.0] * len(b.columns) for b in own)

@@ -34,7 +34,9 @@ def test_every_effect_is_asked_about_or_its_absence_has_a_reason(drive):
     named = {h.effect.name for h in asked if not h.allowed}
     faster = {e.name for e in EFFECTS.values() if e.drive.at_full_rate}  # not of the search
     assert faster == {"tone_ring"}
-    assert named | set(untested) | faster == set(EFFECTS)
+    sought = {e.name for e in EFFECTS.values() if e.drive.begins_like}  # where they begin: test_moments
+    assert sought == {"pressure_loss"}
+    assert named | set(untested) | faster | sought == set(EFFECTS)
     assert not faster & (named | set(untested))
     assert not named & set(untested)
     assert "no water depth in the log" in untested["contact_loss"]

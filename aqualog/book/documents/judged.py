@@ -101,7 +101,7 @@ DIAGNOSE = Document(
             text("mechanism", "what it acts through: force, accelerometer, torque, slip_f, ...; null of a campaign",
                  null=True),
             text("unit", "unit of the function; empty: that of the channel"),
-            several("depends_on", "signals that it is a function of"),
+            several("depends_on", "signals that it is a function of; last, not in `x`, the one that a gain multiplies"),
             number("share", "-", "share of the residual's variance", null=True),
             number("p_value", "-", "probability by chance, of a campaign", null=True),
             number("probability", "-", "probability of this mechanism, of a drive", null=True),

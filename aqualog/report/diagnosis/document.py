@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from aqualog.diagnose.records import Cause, Confusion, Consequence, Diagnosis, Estimate, Gain, Limit, Remainder
+from aqualog.diagnose.shapes import MECHANISMS
 from aqualog.model.effects import EFFECTS
 from aqualog.report.values import fields_of, plain, quantity_text
 
@@ -111,8 +112,12 @@ def _cause(c: Cause) -> dict[str, Any]:
 
 def _remainder(r: Remainder) -> dict[str, Any]:
     x = np.asarray(r.x, dtype=np.float64).reshape(len(r.f), -1)
+    # an error of a gain that goes with the speed goes with what is measured, too
+    scaled = [m.scales for m in MECHANISMS if m.name == r.mechanism and m.scales]
     return {
-        **fields_of(r, "channel", "mechanism", "unit", "depends_on", "share", "p_value", "probability"),
+        **fields_of(r, "channel", "mechanism", "unit"),
+        "depends_on": list(dict.fromkeys([*r.depends_on, *scaled])),
+        **fields_of(r, "share", "p_value", "probability"),
         "x": plain(x),
         **{name: plain(np.asarray(getattr(r, name), dtype=np.float64)) for name in ("f", "low", "high")},
         **fields_of(r, "proxies", "nearest", "cosine", "sentence", similar_to="nearest"),

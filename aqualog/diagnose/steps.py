@@ -1,0 +1,107 @@
+"""Steps over time: offsets that begin, or begin and end, suddenly or slowly, where they explain most."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aqualog.core.records import FloatArray
+
+__all__ = ["EDGES", "OUTLIER", "begun", "gain_of", "intervals", "trapezoid"]
+
+EDGES = 75  # of intervals, evenly over the drive
+OUTLIER = 6.0  # of the median size (4 standard deviations), beyond which a sample counts no more
+SHORTEST = 3  # edges from the begin of an interval to its end
+INTERVALS, PART = 5, 0.1  # the most intervals of a form, each with this share of what the one before explains (K)
+
+
+def begun(weight: FloatArray, score: FloatArray) -> tuple[int, int]:
+    """Middle and length [samples] of the ramp to a lasting offset that explains most beside a constant."""
+    n = weight.size
+    A, B = (np.concatenate([[0.0], np.cumsum(x)]) for x in (weight, score))
+    at = np.linspace(0, n, EDGES + 1).astype(np.intp)[1:-1]
+    a, b = A[-1] - A[at], B[-1] - B[at]
+    rest = np.maximum(a * (1.0 - a / A[-1]), 1e-9 * A[-1])
+    best = int(np.argmax((b - a / A[-1] * B[-1]) ** 2 / rest))
+    (low, _, rise), _ = _moved(int(at[best]), n, int(at[0]), np.zeros((0, n)), weight, score)
+    return low, rise
+
+
+def intervals(weight: FloatArray, score: FloatArray) -> list[tuple[int, int, int]]:
+    """Offsets that begin and end, suddenly or slowly, each the one that explains most beside those before.
+
+    Each from a sample to another, with slopes of so many samples.
+    """
+    n = weight.size
+    at = np.linspace(0, n, EDGES + 1).astype(np.intp)
+    i, j = np.triu_indices(EDGES + 1, SHORTEST)
+    usable = i + EDGES - j >= SHORTEST
+    i, j = at[i[usable]], at[j[usable]]
+    A = np.concatenate([[0.0], np.cumsum(weight)])
+    a = A[j] - A[i]
+    rest = np.maximum(a * (1.0 - a / A[-1]), 1e-9 * A[-1])
+    out: list[tuple[int, int, int]] = []
+    beside, known, last = np.zeros((0, n)), 0.0, 0.0
+    for _ in range(INTERVALS):
+        B = np.concatenate([[0.0], np.cumsum(_left(beside, weight, score))])
+        b = B[j] - B[i]
+        best = int(np.argmax((b - a / A[-1] * B[-1]) ** 2 / rest))
+        edges, gain = _moved(int(i[best]), int(j[best]), int(at[1]), beside, weight, score)
+        if gain - known <= PART * last:
+            break
+        out.append(edges)
+        beside, last, known = np.vstack([beside, trapezoid(n, *edges)]), gain - known, gain
+    return out
+
+
+def _moved(
+    low: int, high: int, step: int, beside: FloatArray, weight: FloatArray, score: FloatArray
+) -> tuple[tuple[int, int, int], float]:  # fmt: skip
+    """An interval with ends and slopes where it explains most beside others, and what they all explain."""
+    n, rise, gain = weight.size, 0, 0.0
+    X = np.vstack([np.ones(n), beside])
+    inverse = np.linalg.inv((X * weight) @ X.T)
+    right = X @ score
+    known = float(right @ inverse @ right - right[0] ** 2 / weight.sum())
+    inside = (low > 0, high < n)
+    shortest = SHORTEST * step
+    while step >= 1:
+        moves = [(d * inside[0], e * inside[1], r) for d in (-step, 0, step) for e in (-step, 0, step)
+                 for r in (-step, 0, step)]  # fmt: skip
+        tried = [(low + d, high + e, max(rise + r, 0)) for d, e, r in moves]
+        tried = [x for x in dict.fromkeys(tried) if x[1] - x[0] >= shortest]
+        T = np.array([trapezoid(n, *x) for x in tried])
+        shared, own = T @ (X * weight).T, (T**2) @ weight
+        cross = shared @ inverse
+        left = own - (cross * shared).sum(axis=1)
+        each = known + (T @ score - cross @ right) ** 2 / np.maximum(left, 1e-9 * own + 1e-30)
+        k = int(np.argmax(each))
+        if each[k] <= gain * (1.0 + 1e-9):
+            step //= 2
+        else:
+            gain, (low, high, rise) = float(each[k]), tried[k]
+    return (low, high, rise), gain
+
+
+def _left(columns: FloatArray, weight: FloatArray, score: FloatArray) -> FloatArray:
+    """The score beside a constant and columns (k, n). (n,)"""
+    X = np.vstack([np.ones(weight.size), columns])
+    gram = (X * weight) @ X.T
+    gram += 1e-9 * np.trace(gram) * np.eye(len(X))
+    return np.asarray(score - weight * (np.linalg.solve(gram, X @ score) @ X))
+
+
+def trapezoid(n: int, low: int, high: int, rise: int) -> FloatArray:
+    """One from `low` to `high`, with slopes of `rise` samples about both ends; no slope at the drive's own ends."""
+    k = np.arange(n) + 0.5
+    width = max(rise, 1)
+    up = np.clip((k - low) / width + 0.5, 0.0, 1.0) if low > 0 else np.ones(n)
+    down = np.clip((high - k) / width + 0.5, 0.0, 1.0) if high < n else np.ones(n)
+    return np.asarray(np.minimum(up, down))
+
+
+def gain_of(columns: FloatArray, weight: FloatArray, score: FloatArray) -> float:
+    """What columns (k, n) or (n,) explain beside a constant."""
+    X = np.vstack([np.ones(weight.size), columns])
+    gram, right = (X * weight) @ X.T, X @ score
+    gram += 1e-9 * np.trace(gram) * np.eye(len(X))
+    return float(right @ np.linalg.solve(gram, right) - right[0] ** 2 / gram[0, 0])

@@ -1,0 +1,50 @@
+"""Where an effect begins in a drive: found from the response of another one, without a simulation of each moment."""
+
+import numpy as np
+import pytest
+
+from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.hypotheses import hypotheses, residual, signatures
+from aqualog.diagnose.moments import moments
+from aqualog.diagnose.search import simulated
+from aqualog.diagnose.steps import begun, intervals, trapezoid
+from aqualog.model.term import Model
+from tests.diagnose.test_drive import CAR, NOISY, plain, signals, term
+
+
+@pytest.mark.parametrize(("where", "start", "duration"), [("fr", 31.0, 22.0), ("rl", 52.0, 3.0)])
+def test_a_tyre_that_loses_its_air(where, start, duration):
+    log = signals(term("pressure_loss", where, radius=0.006, start=start, duration=duration), sensors=NOISY)
+    d = prepare(log, CAR, "a")
+    asked, _ = hypotheses([d], Model())
+    like = [h for h in asked if h.effect.name == "tyre_radius"]
+    base = residual(d, Model())
+    found = {h.where: h for h in moments(d, base, like, signatures(d, Model(), like, base=base))}
+    assert set(found) == {"fl", "fr", "rl", "rr"}
+    h = found[where]
+    middle = h.fixed["start"] + 0.5 * h.fixed["duration"]
+    assert middle == pytest.approx(start + 0.5 * duration, abs=2.0)
+    assert h.fixed["duration"] == pytest.approx(duration, abs=6.0)
+    assert h.free == ("radius",)
+
+
+def test_one_drive_has_its_own_moments_and_several_share_some():
+    one = prepare(plain(), CAR, "a")
+    few = [h for h in hypotheses([one], Model())[0] if h.effect.name in ("tyre_radius", "aero_drag")]
+    evidence = simulated([one], few, Model(), lambda _t, _s: None)
+    assert [h.key for h in evidence.asked[len(few) :]] == [f"pressure_loss@{w}" for w in ("fl", "fr", "rl", "rr")]
+    assert len(evidence.signatures[0]) == len(evidence.asked)
+    both = [one, prepare(plain(), CAR, "b")]
+    starts = {h.fixed["start"] for h in hypotheses(both, Model())[0] if h.key == "pressure_loss@fl"}
+    assert len(starts) == 5
+
+
+def test_a_ramp_and_two_intervals_are_where_they_are():
+    n = 2000
+    weight = np.full(n, 2.0)
+    ramp = np.clip((np.arange(n) + 0.5 - 700.0) / 300.0 + 0.5, 0.0, 1.0)
+    assert begun(weight, weight * (ramp - 3.0)) == (pytest.approx(700, abs=3), pytest.approx(300, abs=6))
+    two = 1.0 * trapezoid(n, 301, 450, 0) - 2.0 * trapezoid(n, 1500, 1700, 80)
+    found = sorted(intervals(weight, weight * (two + 0.3)))
+    assert len(found) == 2
+    assert np.abs(np.array(found) - [(301, 450, 0), (1500, 1700, 80)]).max() <= 5
