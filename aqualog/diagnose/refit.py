@@ -19,6 +19,8 @@ from aqualog.model.term import Model
 
 __all__ = ["KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "metric", "refit"]
 
+Rows = FloatArray | NDArray[np.float32]
+
 KNOWN = 0.25  # share of the tolerances that values and intervals take into account
 PRIOR_WIDTH = 3.0  # the prior is this much wider than the effect's: it only keeps huge, cancelling pairs apart
 SHRINK = (1.0, 0.5, 0.2)
@@ -81,7 +83,7 @@ class Metric:
         found = [w.single(each[p.drive][..., p.at]) for p, w in zip(self.parts, self.weighings, strict=True)]
         return np.float32(math.sqrt(self.coarse)) * np.concatenate(found, axis=1)
 
-    def inner(self, u: FloatArray, w: FloatArray) -> FloatArray:
+    def inner(self, u: Rows, w: Rows) -> FloatArray:
         """Inner products of rows (a, N) and (b, N): (a, b)."""
         at_u = self.across(u)
         out = -at_u @ self.M @ (at_u if w is u else self.across(w)).T
@@ -90,7 +92,7 @@ class Metric:
             out += x @ (x if w is u else w[:, i : i + CHUNK].astype(np.float64, copy=False)).T
         return np.asarray(out)
 
-    def across(self, u: FloatArray) -> FloatArray:
+    def across(self, u: Rows) -> FloatArray:
         """Inner products of rows (a, N) with those of the tolerances, in double precision. (a, k)"""
         out = np.zeros((len(u), len(self.A)))
         for i in range(0, u.shape[1], CHUNK):
