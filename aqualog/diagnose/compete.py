@@ -61,12 +61,12 @@ class _Deviations:
     columns: tuple[Spectra, ...]
 
 
-def compete(arena: Arena) -> Posterior:
+def compete(arena: Arena, *, rounds: int = ROUNDS) -> Posterior:
     """The posterior over the sets that a search with swaps visits.
 
     The noise is that beside which the measurement is most likely, after one of the first candidates in the metrics of
     coloured and of white noise, or after the best set so far. Else a slow effect would count as noise and could not be
-    found. The noise is sought with the whole likelihood, the posterior has a share of it.
+    found. The noise is sought with the whole likelihood, in at most so many rounds; the posterior has a share of it.
     """
     white = arena.white()
     whitely = arena.tolerant(white)
@@ -74,7 +74,7 @@ def compete(arena: Arena) -> Posterior:
     noise = _beside(deviations, (), None)
     gram = arena.inner(noise.weighings)
     known: dict[Members, _Noise] = {}  # after sets of the metric of white noise, which stays
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         tolerant = arena.tolerant(gram)
         sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram), width=ROUGHLY)
         best = max(sets, key=lambda k: sets[k])

@@ -133,7 +133,8 @@ def describe(mechanism: Mechanism, r: Remainder) -> str:
     text += ")."
     if r.proxies:
         text += f" It cannot be distinguished from {_list(r.proxies)} here."
-    if {"t", "position"} & set(r.depends_on):
+    # what comes again at equal ways does not at equal times, unless the speed never changes: then both are likely
+    if {"t", "position"} & set(r.depends_on) and not r.manner.startswith(("in waves", "for ")):
         text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."
     if r.nearest is not None:
         same = "looks nearly the same" if r.cosine >= ALIKE else "is the nearest known effect"

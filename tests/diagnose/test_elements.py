@@ -36,6 +36,7 @@ def test_a_force_that_comes_and_goes(rise):
         assert (begin, end) == (pytest.approx(95.3, abs=2.0), pytest.approx(161.7, abs=2.0))
         assert f"Unexplained: a force on the car {r.manner} (probability" in r.sentence
         assert short_form(r) == f"a force on the car {r.manner}"
+        assert "Without a second pass" in r.sentence
 
 
 def test_a_wave_of_the_road():
@@ -57,6 +58,7 @@ def test_a_patch_that_comes_again(name, unit, length, period):
     said = re.fullmatch(rf"a force on the car for (\S+) {unit} in every (\S+) {unit}", short_form(forms[0])).groups()
     assert tuple(map(float, said)) == (pytest.approx(length, rel=0.15), pytest.approx(period, rel=0.02))
     assert forms[0].f.max() == pytest.approx(250.0, rel=0.2)
+    assert "second pass" not in forms[0].sentence
 
 
 def test_two_forces_of_different_size():
