@@ -23,7 +23,7 @@ from aqualog.model.situations import SITUATIONS
 from aqualog.model.term import Model
 from aqualog.model.tyre import TYRES
 
-__all__ = ["DETECTORS", "DRY", "PASSES", "consequences", "consequences_on_logs"]
+__all__ = ["DETECTORS", "DRY", "PASSES", "consequences"]
 
 DETECTORS = ("resistance", "joint_criteria", "joint_cusum")
 DRY = (
@@ -85,25 +85,6 @@ def consequences(
         # twice the usual step of a simulation: half the time, the same alarms
         signals = as_signals(simulate(scenario, model, dt=2e-3), vehicle=vehicle)
         seen.append(_both(signals, vehicle, model, labels_in(signals)))
-    return _summed(seen)
-
-
-def consequences_on_logs(
-    drives: Iterable[tuple[str, Signals]], vehicle: Vehicle, model: Model, *,
-    progress: Callable[[str], None] = lambda _: None,
-) -> tuple[Consequence, ...]:  # fmt: skip
-    """Alarms on drives that are known to be dry, without and with the model: every event is a false one.
-
-    Parameters
-    ----------
-    drives : iterable of (name, Signals)
-    vehicle, model, progress
-        As of `consequences`.
-    """
-    seen = []
-    for name, signals in drives:
-        progress(f"{name} with the extended model")
-        seen.append(_both(signals, vehicle, model, None))
     return _summed(seen)
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+import numpy.typing as npt
 
 from aqualog.align.mapping import MAP_HINT
 from aqualog.core.errors import SignalError
@@ -33,9 +34,10 @@ from aqualog.model.follow import FOLLOW_RATE, Course, follow
 from aqualog.model.scenario import Lane
 from aqualog.model.term import Model
 
-__all__ = ["Drive", "led_by", "prepare", "rolling_under"]
+__all__ = ["Drive", "led_by", "prepare", "rolling_under", "stretches"]
 
 BESIDE_S = 1.0  # [s] before and after what is left out
+BEHIND_S = 1.0  # [s] after a stretch of water, in which the rear axle and the speed still have it
 GAP_S = 0.25  # [s] longer gaps are not bridged
 A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
 A_X_MAX = 6.0  # [m/s^2]
@@ -335,3 +337,12 @@ def _coordinates(
     if "ambient_temperature" in columns:
         out["ambient_temperature"] = columns["ambient_temperature"]
     return {n: block_means(x, dt) for n, x in out.items()}
+
+
+def stretches(drive: Drive) -> npt.NDArray[np.int64]:
+    """Number of the stretch of water under the car or just behind it, from 1 on; 0 on dry road. (m,)"""
+    wet = drive.coordinates.get("water_depth", np.zeros(drive.mask.size))[: drive.mask.size] > 0.0
+    k = round(BEHIND_S / block_step(drive.dt))
+    late = np.convolve(wet.astype(np.float64), np.ones(k + 1), "full")[: wet.size] > 0.5
+    begins = np.diff(late.astype(np.int64), prepend=0) > 0
+    return np.where(late, np.cumsum(begins), 0)

@@ -15,8 +15,7 @@ from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.full_rate import LEVEL, Kind, PerTurn, Z, per_turn, wheel_columns
 from aqualog.diagnose.outcome import Outcome
-from aqualog.diagnose.probability import SURE
-from aqualog.diagnose.records import Cause, Estimate, Verdict
+from aqualog.diagnose.records import SURE, Cause, Estimate, Verdict
 from aqualog.diagnose.seams import seams
 from aqualog.diagnose.words import cause_sentence, place
 from aqualog.model.effects import EFFECTS

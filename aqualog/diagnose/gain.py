@@ -31,7 +31,6 @@ __all__ = [
     "gain",
     "log_score_gain",
     "measured_gain",
-    "oracle_share",
 ]
 
 BLOCK_S = 20.0  # [s] longer than the noise of any channel remembers
@@ -196,15 +195,6 @@ def log_score_gain(
 
 def _drives_are_units(blocks: Sequence[FloatArray]) -> bool:
     return len(blocks) >= DRIVES_AS_UNITS or (len(blocks) > 1 and any(b.size < 2 for b in blocks))
-
-
-def oracle_share(nominal: float, extended: float, oracle: float) -> float:
-    """Gain relative to that of the true model, (nominal - extended) / (nominal - oracle).
-
-    Losses or log scores alike; 1 is as good as the true model, 0 as the base model, negative is worse; NaN where the
-    true model has no gain. [-]
-    """
-    return (nominal - extended) / (nominal - oracle) if nominal != oracle else math.nan
 
 
 def corridor_share(predicted: FloatArray, measured: FloatArray, mask: BoolArray | None = None) -> float:

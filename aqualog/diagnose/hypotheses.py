@@ -11,8 +11,7 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.channels import channel_values
-from aqualog.diagnose.drive import Drive, led_by
-from aqualog.diagnose.lanes import stretches
+from aqualog.diagnose.drive import Drive, led_by, stretches
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.tolerances import LANE_TOLERANCES, STAND_IN, TOLERANCES
 from aqualog.model.effects import EFFECTS

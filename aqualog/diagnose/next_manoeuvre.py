@@ -14,8 +14,7 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.manoeuvres import SENSORS, Run, Sensor, checks, fitting
 from aqualog.diagnose.noise import Noise
 from aqualog.diagnose.outcome import Rival
-from aqualog.diagnose.probability import SURE
-from aqualog.diagnose.records import Manoeuvre
+from aqualog.diagnose.records import SURE, Manoeuvre
 from aqualog.diagnose.run_information import Case, Forecast, entropy, forecast, of_check, of_log, of_run
 from aqualog.diagnose.words import listed, name_of
 from aqualog.model.term import Check, Model

@@ -14,8 +14,7 @@ from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.compete import Members, Posterior, fitted
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.judge import repeats
-from aqualog.diagnose.probability import SURE, tempered
-from aqualog.diagnose.records import Alternative, Cause, Estimate, Verdict
+from aqualog.diagnose.records import SURE, Alternative, Cause, Estimate, Verdict, tempered
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import Found, Option, sharpened
 from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, candidates, decided, whole

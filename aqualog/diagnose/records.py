@@ -10,11 +10,30 @@ from aqualog.core.records import FloatArray
 from aqualog.model.term import Model
 
 __all__ = [
-    "AGREES", "Agreement", "Alternative", "ByDrive", "Cause", "ChannelGain", "Confusion", "Consequence", "Diagnosis",
-    "Estimate", "Gain", "Limit", "Manoeuvre", "Remainder", "ResidualView", "Significance", "Verdict",
+    "AGREES",
+    "SURE",
+    "Agreement",
+    "Alternative",
+    "ByDrive",
+    "Cause",
+    "ChannelGain",
+    "Confusion",
+    "Consequence",
+    "Diagnosis",
+    "Estimate",
+    "Gain",
+    "Limit",
+    "Manoeuvre",
+    "Remainder",
+    "ResidualView",
+    "Significance",
+    "Verdict",
+    "tempered",
 ]  # fmt: skip
 
 AGREES = 0.01  # p-value below which drives are reported to differ
+SURE = 0.95  # probability from which a cause is named
+MOST = 0.99995  # no more certain than this: the posterior knows only the causes of the library
 
 Verdict = Literal["no_effect", "named", "compound", "cannot_tell", "unexplained", "not_testable"]
 
@@ -263,3 +282,8 @@ class Diagnosis:
     views: tuple[ResidualView, ...] = field(default=(), repr=False)
     agreement: tuple[Agreement, ...] = ()
     caution: str = ""
+
+
+def tempered(p: float) -> float:
+    """The probability of a name with the share `p` of a posterior that is coarsened (`competition.COARSE`)."""
+    return min(max(p, 1.0 - MOST), MOST)

@@ -31,8 +31,7 @@ from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
 from aqualog.diagnose.outcome import Outcome, conclude, with_causes
-from aqualog.diagnose.probability import SURE
-from aqualog.diagnose.records import Agreement, Consequence, Diagnosis, Gain, ResidualView, Verdict
+from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, ResidualView, Verdict
 from aqualog.diagnose.search import Found, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.unknown_term import as_term, short_form

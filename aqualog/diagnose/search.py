@@ -23,10 +23,10 @@ from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import with_elements
 from aqualog.diagnose.evidence import Evidence, make_evidence, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in
-from aqualog.diagnose.moments import moments
 from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
+from aqualog.diagnose.steps import moments
 from aqualog.diagnose.subsets import compatible, imitations
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unexplained import unknown_forms

@@ -14,8 +14,7 @@ from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.compete import Fitted, Posterior, fitted
 from aqualog.diagnose.competition import Block
-from aqualog.diagnose.probability import SURE, tempered
-from aqualog.diagnose.records import Remainder
+from aqualog.diagnose.records import SURE, Remainder, tempered
 from aqualog.diagnose.sets import Sets, evidence_of
 from aqualog.diagnose.shapes import Shape
 from aqualog.diagnose.unknown_term import describe

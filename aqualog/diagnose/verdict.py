@@ -7,8 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
-from aqualog.diagnose.probability import SURE, tempered
-from aqualog.diagnose.records import Alternative, Cause, Verdict
+from aqualog.diagnose.records import SURE, Alternative, Cause, Verdict, tempered
 from aqualog.diagnose.sets import grouped, shares
 
 __all__ = ["CREDIBLE", "PLACES", "Candidate", "Decision", "candidates", "decided", "whole"]

@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from string import Formatter
 
 from aqualog.core.units import displayed_unit
-from aqualog.diagnose.probability import SURE
-from aqualog.diagnose.records import Cause, Estimate
+from aqualog.diagnose.records import SURE, Cause, Estimate
 from aqualog.model.term import Effect, Term
 
 __all__ = ["cause_sentence", "listed", "name_of", "place", "quantity", "term_words", "verdict_sentence"]

@@ -4,11 +4,8 @@ import pytest
 
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose import consequence
-from aqualog.diagnose.consequence import DETECTORS, DRY, PASSES, consequences, consequences_on_logs
+from aqualog.diagnose.consequence import DETECTORS, DRY, PASSES, consequences
 from aqualog.model.effects import EFFECTS
-from aqualog.model.log import as_signals
-from aqualog.model.scenario import Scenario
-from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
 
 CAR = Vehicle(name="car", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"drivetrain", *KEYS}))
@@ -76,21 +73,3 @@ def test_the_same_seed_gives_the_same(monkeypatch):
     monkeypatch.setattr(consequence, "PASSES", PASSES[:1])
     one, same, other = (by_name(consequences(CAR, PAYLOAD, seed=s)) for s in (2, 2, 3))
     assert one == same != other
-
-
-def test_logs_known_to_be_dry():
-    drive = as_signals(simulate(Scenario(CAR, duration_s=48.0, speed=SPEED), PAYLOAD), vehicle=CAR, truth=False)
-    told = []
-    found = by_name(consequences_on_logs([("a", drive), ("b", drive)], CAR, PAYLOAD, progress=told.append))
-    c = found["resistance"]
-    assert c.false_alarms_before >= 2
-    assert c.false_alarms_before % 2 == 0
-    assert c.false_alarms_after == 0
-    assert (c.passes, c.found_before, c.latency_before_s) == (0, 0, None)
-    assert c.distance_km == pytest.approx(2 * 1.038, rel=0.03)
-    assert told == ["a with the extended model", "b with the extended model"]
-
-
-def test_a_detector_that_cannot_run_is_left_out():
-    drive = as_signals(simulate(Scenario(Vehicle(name="x"), duration_s=10.0, speed=SPEED)), vehicle=CAR, truth=False)
-    assert consequences_on_logs([("a", drive)], Vehicle(name="x"), PAYLOAD) == ()

@@ -14,7 +14,6 @@ from aqualog.diagnose.gain import (
     corridor_share,
     gain,
     log_score_gain,
-    oracle_share,
 )
 
 RNG = np.random.default_rng(11)
@@ -124,13 +123,6 @@ def test_blocks_that_do_not_match_are_refused():
         log_score_gain([np.zeros(3)], [np.zeros(4)], seed=1)
     with pytest.raises(FitError, match="finite"):
         log_score_gain([np.zeros(3)], [np.full(3, np.nan)], seed=1)
-
-
-def test_oracle_share():
-    assert oracle_share(-100.0, -20.0, 0.0) == pytest.approx(0.8)
-    assert oracle_share(0.5, 0.1, 0.0) == pytest.approx(0.8)
-    assert oracle_share(-100.0, -120.0, 0.0) < 0.0
-    assert math.isnan(oracle_share(1.0, 1.0, 1.0))
 
 
 def test_corridor_share():

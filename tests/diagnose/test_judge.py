@@ -7,7 +7,7 @@ import pytest
 
 from aqualog.diagnose.judge import repeats
 from aqualog.diagnose.noise import fit_noise
-from aqualog.diagnose.probability import tempered
+from aqualog.diagnose.records import tempered
 from aqualog.model.term import Model
 from tests.diagnose.test_unexplained import arena
 

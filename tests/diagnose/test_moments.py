@@ -5,9 +5,8 @@ import pytest
 
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import hypotheses, residual, signatures
-from aqualog.diagnose.moments import moments
 from aqualog.diagnose.search import simulated
-from aqualog.diagnose.steps import begun, intervals, trapezoid
+from aqualog.diagnose.steps import begun, intervals, moments, trapezoid
 from aqualog.model.term import Model
 from tests.diagnose.test_drive import CAR, NOISY, plain, signals, term
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from aqualog.diagnose.probability import SURE
-from aqualog.diagnose.records import Cause, Estimate
+from aqualog.diagnose.records import SURE, Cause, Estimate
 from aqualog.diagnose.verdict import candidates, decided
 
 
