@@ -26,11 +26,11 @@ def begun(weight: FloatArray, score: FloatArray) -> tuple[int, int]:
     """Middle and length [samples] of the ramp to a lasting offset that explains most beside a constant."""
     n = weight.size
     A, B = (np.concatenate([[0.0], np.cumsum(x)]) for x in (weight, score))
-    at = np.linspace(0, n, EDGES + 1).astype(np.intp)[1:-1]
+    at = np.linspace(0, n, EDGES + 1).astype(np.intp)[SHORTEST:-SHORTEST]
     a, b = A[-1] - A[at], B[-1] - B[at]
     rest = np.maximum(a * (1.0 - a / A[-1]), 1e-9 * A[-1])
     best = int(np.argmax((b - a / A[-1] * B[-1]) ** 2 / rest))
-    (low, _, rise), _ = _moved(int(at[best]), n, int(at[0]), np.zeros((0, n)), weight, score)
+    (low, _, rise), _ = _moved(int(at[best]), n, n // EDGES, np.zeros((0, n)), weight, score)
     return low, rise
 
 
@@ -71,7 +71,7 @@ def _moved(
     right = X @ score
     known = float(right @ inverse @ right - right[0] ** 2 / weight.sum())
     inside = (low > 0, high < n)
-    shortest = SHORTEST * step
+    shortest = min(SHORTEST * step, high - low)
     while step >= 1:
         moves = [(d * inside[0], e * inside[1], r) for d in (-step, 0, step) for e in (-step, 0, step)
                  for r in (-step, 0, step)]  # fmt: skip

@@ -17,6 +17,8 @@ class Plain:
     def rows(self, each):
         return np.concatenate([x.reshape(len(x), -1) for x in each], axis=1)
 
+    single = rows
+
     def inner(self, u, w):
         return u @ w.T
 

@@ -43,6 +43,8 @@ def test_a_ramp_and_two_intervals_are_where_they_are():
     weight = np.full(n, 2.0)
     ramp = np.clip((np.arange(n) + 0.5 - 700.0) / 300.0 + 0.5, 0.0, 1.0)
     assert begun(weight, weight * (ramp - 3.0)) == (pytest.approx(700, abs=3), pytest.approx(300, abs=6))
+    late = np.arange(300) > 284  # not long before the end
+    assert begun(weight[:300], weight[:300] * late) == (pytest.approx(285, abs=4), pytest.approx(0, abs=8))
     two = 1.0 * trapezoid(n, 301, 450, 0) - 2.0 * trapezoid(n, 1500, 1700, 80)
     found = sorted(intervals(weight, weight * (two + 0.3)))
     assert len(found) == 2

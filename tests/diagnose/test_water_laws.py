@@ -91,7 +91,8 @@ def test_lanes_differ_in_full_however_well_a_file_is_known():
     lane = np.array([h.lane is not None for h, c in zip(b.asked, b.columns, strict=True) for _ in c])
     share = np.where(lane, 1.0, KNOWN)[at]
     A = weighings[0].rows(b.signatures[0][at] * (share * b.tolerance[at])[:, None, None])
-    np.testing.assert_allclose(known.A, A)
+    # single precision, of the largest entry
+    np.testing.assert_allclose(known.A, A, rtol=0.0, atol=3e-7 * np.abs(A).max())
 
 
 @pytest.mark.parametrize("gain", [0.4, 1.6])
