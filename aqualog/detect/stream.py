@@ -70,8 +70,7 @@ class DriveStream:
         self.memory = memory or Memory()
         self._features = FeatureStream(vehicle, dt, available, correct_yaw=settings.correct_yaw)
         self._available = self._features.available
-        usual = all_of(*OWN, "warning") if settings.warns else all_of(*OWN)
-        chosen = tuple(usual if detectors is None else detectors)
+        chosen = tuple(all_of(*OWN) if detectors is None else detectors)
         unavailable, limited = check_needs(vehicle, available, rate_hz=1e9 / dt_ns, detectors=chosen)
         self.unavailable: tuple[Unavailable, ...] = tuple(unavailable)
         self.limited: tuple[Unavailable, ...] = tuple(limited)

@@ -23,7 +23,6 @@ from aqualog.align.load import load_signals
 from aqualog.config.scenario import load_scenario
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.notation import WHEELS
-from aqualog.detect.detector import Settings
 from aqualog.detect.stream import detect_drive
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
@@ -46,7 +45,7 @@ def sample():
     signals = load_signals([SAMPLES / "lane_drive.mf4"], vehicle=car)
     return (
         signals.array("on_water"),
-        detect_drive(signals, car, settings=Settings(warns=True)),
+        detect_drive(signals, car),
         np.arange(signals.frame.height) * signals.dt,
     )
 
