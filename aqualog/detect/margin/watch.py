@@ -7,10 +7,10 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
 from aqualog.core.notation import SIDES
 from aqualog.core.records import BoolArray, FloatArray, Margin
 from aqualog.core.vehicle import Vehicle
+from aqualog.detect.braking import lasting
 from aqualog.detect.detector import (
     Detector,
     Found,
@@ -40,15 +40,6 @@ FEATURES: Mapping[str, str] = {
     "contact_expected": "contact",
 }  # fmt: skip
 """Feature -> row of the filter. They have a value where water is probable; `water_probability` has one everywhere."""
-
-
-@compiled
-def _lasting(least, near, run):  # type: ignore[no-untyped-def]
-    out = np.empty(near.size, dtype=np.bool_)
-    for i in range(near.size):
-        run = run + 1 if near[i] else 0
-        out[i] = run >= least
-    return out, run
 
 
 def params(vehicle: Vehicle, dt: float) -> FilterParams:
@@ -81,7 +72,7 @@ class MarginWatch:
         with np.errstate(invalid="ignore"):
             wet = rows["p_water"] > PROBABLE
             near = rows["p_near"] > self._setup.threshold
-        active, self._run = _lasting(self._least, near, self._run)
+        active, self._run = lasting(near, self._run, least=self._least)
         features = {name: np.where(wet, rows[row], np.nan) for name, row in FEATURES.items()}
         margin = features["aquaplaning_margin"]
         evidence = {"v_x": ("first", v), "margin_min": ("min", margin), "contact_min": ("min", rows["contact"])}
