@@ -14,7 +14,7 @@ from aqualog.detect.events import EventBook
 from aqualog.detect.joint_criteria import GATE, GATE_AFTER, JOINT_CRITERIA, MAY_BE_WATER
 from aqualog.detect.joint_cusum import JOINT_CUSUM, TERMS
 from aqualog.detect.resistance import MEASURE
-from tests.detect import braking_study
+from tests.detect import episode_study
 from tests.drives import CAR
 
 DT = 0.01
@@ -203,10 +203,10 @@ def test_a_slope_lost_at_low_speed_stays_anothers_until_the_road_is_dry_again():
     assert bits[2050:].all()
 
 
-@pytest.mark.parametrize(("road", "found"), [("water", "aquaplaning"), ("ice", None)])
-def test_water_stops_a_braked_wheel_and_ice_turns_it_up_again(road, found):
-    """Below the brake's own torque a wheel goes on slowing down only in water; the gate of the resistance is shut."""
-    delays, _, _, _, result = braking_study.one(road, 4)
-    kinds = {e.kind for e in result.judgement.episodes}
-    assert ("aquaplaning" in kinds) == (found is not None)
-    assert found is None or delays["full"] <= 0.5
+@pytest.mark.parametrize(("road", "limit"), [("water", 0.5), ("ice", np.nan)])
+def test_water_stops_a_braked_wheel_and_ice_turns_it_up_again(road, limit):
+    """Only in water a wheel slows down further while its brake is let off; the gate of the resistance is shut."""
+    for seed in range(4):
+        (full, _), false, _ = episode_study.stop(road, seed, episode_study.SCORING_POOL)
+        assert np.isnan(full) or full <= limit
+        assert not false

@@ -5,7 +5,6 @@ import pytest
 
 from aqualog.detect.margin.emissions import emissions_of
 from aqualog.detect.margin.state import NODES
-from aqualog.detect.margin.watch import Least
 from aqualog.detect.stream import detect_drive
 from aqualog.model.drawing import SCORING_POOL
 from aqualog.model.log import as_signals
@@ -81,14 +80,6 @@ def test_document_and_page(wet):
     assert [line.label for line in row.lines] == ["95 %", "75 %", "median", "25 %", "5 %"]
 
 
-def test_a_dry_drive_has_none():
-    signals, _ = drive(CAR, duration_s=20.0, lanes=(), speed_kmh=((0.0, 80.0), (20.0, 110.0)))
-    result = detect_drive(signals, CAR)
-    assert result.margin is None
-    assert document(result, log="x")["margin"] is None
-    assert not [e for e in result.events if e.detector == "margin"]
-
-
 def test_rain_from_the_first_metre():
     """The dry road is learnt below 40 km/h, where water does nothing: rain all the way is found where it counts."""
     speed = ((0.0, 30.0), (8.0, 30.0), (48.0, 104.0))
@@ -116,18 +107,6 @@ def test_without_torque_it_does_not_run():
     signals, _ = drive(CAR, duration_s=8.0, lanes=(), drop=("torque_rl", "torque_rr"))
     found = {u.detector: u.missing for u in detect_drive(signals, CAR).unavailable}
     assert found["margin"] == ("torque_rl", "torque_rr")
-
-
-def test_the_least_of_pieces_is_that_of_the_whole():
-    rng = np.random.default_rng(3)
-    x = np.where(rng.random(500) < 0.5, np.nan, rng.normal(5.0, 2.0, 500))
-    f = {"aquaplaning_margin": x, "aquaplaning_margin_low": x - 1.0, "aquaplaning_margin_high": x + 1.0}
-    bits = rng.random(500) < 0.01
-    whole, parts = Least(0.01), Least(0.01)
-    whole.push(f, bits)
-    for a, b in ((0, 1), (1, 120), (120, 500)):
-        parts.push({n: v[a:b] for n, v in f.items()}, bits[a:b])
-    assert whole.result() == parts.result()
 
 
 @pytest.mark.parametrize(("name", "seed"), [("rough_asphalt", 30), ("torque_vectoring", 20), ("gear_shifts", 23)])
