@@ -42,7 +42,7 @@ class FilterParams(NamedTuple):
     v_least: float = 11.0  # [m/s] slower, water does nothing that counts
     scale_R: float = 0.1  # [m/s^2] below it a feature is linear, above it logarithmic
     scale_D: float = 5.0e-4  # [-] the same of a slip
-    noise_R: float = 0.10  # [m/s^2] of a step
+    noise_R: float = 0.15  # [m/s^2] of a step; steps in a row err alike
     noise_D: float = 4.0e-4  # [-] of a step, beside what its samples scatter
     noise_M: float = 1.0  # [-] of a log variance
     offset_R: float = 0.15  # [m/s^2] before anything is known

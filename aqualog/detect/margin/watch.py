@@ -29,7 +29,7 @@ from aqualog.detect.margin.state import OUTPUTS, Filter, FilterParams
 
 __all__ = ["FEATURES", "MARGIN", "Least", "MarginWatch", "params"]
 
-THRESHOLD = 0.5  # [-]
+THRESHOLD = 0.25  # [-] dry roads stay below it, and it finds passes 20 km/h away that a half does not
 NEAR = 30.0 / 3.6  # [m/s]
 STEP_S = 0.1  # of the filter
 MIN_RATE = 10.0  # [Hz]
