@@ -275,7 +275,7 @@ def thresholds_page() -> str:
         fence(THRESHOLDS_EXAMPLE, "toml"),
         "## `[thresholds]`",
         table(("key", "unit", "default", "meaning"), own),
-        "`slip_slope_drop` lies between 0 and 1; all others are above 0.",
+        "`slip_slope_drop` and `margin` lie between 0 and 1; all others are above 0.",
         "## `[rivals]`",
         _RIVALS,
         table(("key", "unit", "default", "method"), rivals),
