@@ -210,7 +210,7 @@ def margin():
     for name, colour in (("_low", MUTED), ("_q25", WATER), ("", INK), ("_q75", WATER), ("_high", MUTED)):
         line(fig, 1, t, 3.6 * f[f"aquaplaning_margin{name}"].to_numpy(), name.strip("_") or "median", colour, width=1.2)
     line(fig, 2, t, track(result, "margin").statistic, "below 30 km/h", INK, width=1.2)
-    level(fig, 2, 0.5, "threshold 0.5")
+    level(fig, 2, 0.25, "threshold 0.25")
     return fig.update_xaxes(range=(6.0, 20.0))
 
 
