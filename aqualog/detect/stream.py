@@ -138,8 +138,7 @@ class Through:
         self._checks.push(columns, piece.features)
         self._events += piece.events
         self._way.push(piece.features["v_x_hat"])
-        warned = next((t.active for t in piece.tracks if t.detector == MARGIN.name), None)
-        self._least.push(piece.features, warned)
+        self._least.push(piece.features, next((t for t in piece.tracks if t.detector == MARGIN.name), None))
         joint = (t for t in piece.tracks if t.detector in JOINT)
         self._judged += max((int(np.count_nonzero(~np.isnan(t.statistic))) for t in joint), default=0)
         return piece

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 import numpy as np
 
 from aqualog.core.notation import SIDES
-from aqualog.core.records import BoolArray, FloatArray, Margin
+from aqualog.core.records import FloatArray, Margin, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.braking import lasting
 from aqualog.detect.detector import (
@@ -95,18 +95,19 @@ class Least:
         self._best = (math.inf, math.nan, math.nan, math.nan)
         self._warned = math.nan
 
-    def push(self, features: Mapping[str, FloatArray], active: BoolArray | None) -> None:
-        """Take features and warning bits (n,) of the next samples."""
-        margin = features.get("aquaplaning_margin")
-        if margin is None or active is None:
+    def push(self, features: Mapping[str, FloatArray], track: Track | None) -> None:
+        """Take features (n,) and the detector's track of the next samples."""
+        if track is None:
             return
+        # a distance by the resistance alone, without a slip, is no least one
+        margin = np.where(track.statistic > 0.0, features["aquaplaning_margin"], np.nan)
         if np.isfinite(margin).any():
             i = int(np.nanargmin(margin))
             if margin[i] < self._best[0]:
                 low, high = features["aquaplaning_margin_low"][i], features["aquaplaning_margin_high"][i]
                 self._best = (float(margin[i]), float(low), float(high), (self._rows + i) * self._dt)
-        if math.isnan(self._warned) and active.any():
-            self._warned = (self._rows + int(np.argmax(active))) * self._dt
+        if math.isnan(self._warned) and track.active.any():
+            self._warned = (self._rows + int(np.argmax(track.active))) * self._dt
         self._rows += margin.size
 
     def result(self) -> Margin | None:
