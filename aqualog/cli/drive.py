@@ -15,7 +15,7 @@ __all__ = ["detect", "slip_slope"]
 
 @command(
     "logs vehicle signals dbc out:results write layouts rate correct_offsets history configuration reference "
-    "margin thresholds model fail_on_event cache data force"
+    "thresholds model fail_on_event cache data force"
 )
 def detect(
     run: Run,
@@ -25,7 +25,6 @@ def detect(
     history: Path | None,
     configuration: str,
     reference: str,
-    margin: bool,
     fail_on_event: bool,
 ) -> Output:
     """Detect aquaplaning in one drive.
@@ -42,7 +41,6 @@ def detect(
       aqualog detect drive.mf4 --vehicle car.toml --write drive_detected.mcap --layouts
       aqualog detect drive.mf4 --vehicle car.toml --history slopes.json --configuration "worn summer, 1.9 bar"
       aqualog detect drive.mf4 --vehicle car.toml --model model.toml
-      aqualog detect drive.mf4 --vehicle car.toml --margin -o out
     """
     from aqualog.core.errors import ConfigError
     from aqualog.face.arguments import refuse_existing
@@ -66,7 +64,7 @@ def detect(
     with run.hearing() as hear:
         result = detect(
             drive, thresholds=run.thresholds, model=run.model, history=history, configuration=configuration,
-            reference=reference, margin=margin, windows=out, whole=write is not None,
+            reference=reference, windows=out, whole=write is not None,
             samples=out is not None or write is not None, progress=hear,
         )  # fmt: skip
         hear("writing")

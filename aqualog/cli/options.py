@@ -239,7 +239,6 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "out:watch": _file("Page that renews itself (HTML); default beside the campaign file: NAME.watch.html."),
     "once": _flag("Measure what is there, and end.", "--once"),
     "every": _option(float, 1.0, "--every", help="Seconds between two looks.", min=0.1, max=3600.0, metavar="S"),
-    "margin": _flag("Also how many km/h are left to full aquaplaning, on trial: tried on simulations.", "--margin"),
     "rivals": _flag("Also the methods of the prior art.", "--rivals"),
     "rival": _option(
         list[str] | None, None, "--rival", metavar="NAME=CHANNEL",

@@ -12,7 +12,17 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import G
 
-__all__ = ["A_BRAKING", "BRAKE_PRESSURE", "HOLD", "TRACTION", "BrakeWatch", "began_free", "hold_on", "is_braking"]
+__all__ = [
+    "A_BRAKING",
+    "BRAKE_PRESSURE",
+    "HOLD",
+    "TRACTION",
+    "BrakeWatch",
+    "began_free",
+    "hold_on",
+    "is_braking",
+    "lasting",
+]
 
 A_BRAKING = -2.0  # [m/s^2] neither rolling, air nor water resistance decelerates a car more than that
 BRAKE_PRESSURE = 3e5  # [Pa] above the offset and residual pressure of a released brake
@@ -78,6 +88,27 @@ def hold_on(x: BoolArray, state: int, *, seconds: float, dt: float) -> tuple[Boo
     """
     y, left = _hold_on(max(1, round(seconds / dt)), state, x)
     return y, int(left)
+
+
+@compiled
+def _lasting(least, run, x, stays):  # type: ignore[no-untyped-def]
+    out = np.empty_like(x)
+    for i in range(x.size):
+        if x[i]:
+            run += 1
+        elif run < least or not stays[i]:
+            run = 0
+        out[i] = run >= least
+    return out, run
+
+
+def lasting(x: BoolArray, state: int, *, least: int, stays: BoolArray | None = None) -> tuple[BoolArray, int]:
+    """Keep a bit off until it has been on for `least` samples in a row, then on while it is or `stays` (n,) is.
+
+    Arguments and result else as `hold_on`.
+    """
+    y, run = _lasting(least, state, x, x if stays is None else stays)
+    return y, int(run)
 
 
 @compiled

@@ -53,13 +53,12 @@ class Settings:
 
     `thresholds` by the name of the detector, in the unit of its statistic; those left out keep their default.
     `correct_yaw` as in `FeatureStream`. `learns_offset`: the offset of the resistance measure on dry road is estimated
-    and subtracted. `warns`: the distance to full aquaplaning besides. `joint_cusum`: scales of joint detector 2.
+    and subtracted. `joint_cusum`: scales of joint detector 2.
     """
 
     thresholds: Mapping[str, float] = field(default_factory=dict)
     correct_yaw: bool = True
     learns_offset: bool = True
-    warns: bool = False
     joint_cusum: JointCusumParams = field(default_factory=JointCusumParams)
 
 

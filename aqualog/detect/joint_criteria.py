@@ -13,14 +13,14 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, other_surface
-from aqualog.detect.braking import began_free, hold_on
+from aqualog.detect.braking import began_free, hold_on, lasting
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.detector import Detector, Found, Needs, Output, Scene, Setup, missing_wheels, traction
 from aqualog.detect.events import AFTER
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import LEVEL, MEASURE, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
-from aqualog.detect.spin import MU_FULL, SLIP_FULL, SPIN_DOWN, SPIN_UP
+from aqualog.detect.spin import HELD_S, MU_FULL, SLIP_FULL, SPIN_DOWN, SPIN_UP
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
@@ -31,6 +31,9 @@ __all__ = [
 THRESHOLD = 0.03  # [m/s]
 GATE_HOLD = 1.0  # [s] the resistance gate stays open this long
 HOLD = 0.5  # [s] a warning outlasts its criteria by this
+SLIP_STOPPED = -0.10  # [-] a braked wheel this far behind slides on any road
+A_STOPPED = -3.0  # [m/s^2] the water takes the brakes' force from the car too
+V_STOPPED = 17.0  # [m/s] slower, no film of road water carries a wheel: `other_surface`
 _NUMBERED = {1: SPIN_DOWN, 2: MINOR_SPIN_DOWN, 3: SPIN_UP, 4: SLIP_SLOPE_DROP, 5: RESISTANCE}
 CRITERIA = {d.name: number for number, d in _NUMBERED.items()}
 SLOPE = 4
@@ -118,7 +121,8 @@ class JointCriteriaWatch:
         self._other = other_surface.OtherParams.make(setup.dt)
         self._surface = other_surface.initial_state()
         self._free: dict[tuple[str, str], tuple[bool, bool]] = {}
-        self._open = self._hold = 0
+        self._open = self._hold = self._recent = 0
+        self._stopped = dict.fromkeys(WHEELS, 0)
 
     def push(self, scene: Scene) -> Output:
         """Take the next piece: one track, the number of criteria that count. [-]"""
@@ -133,20 +137,22 @@ class JointCriteriaWatch:
             {w: traction(f, w) for w in WHEELS},
             f["v_x_hat"],
         )
-        bits = found.behind(gate, slope)
+        bits, stopped = found.behind(gate, slope), self._stopped_by_water(scene)
+        bits[1] |= stopped
+        recent, self._recent = hold_on(stopped, self._recent, seconds=HOLD, dt=self._dt)
         count = np.sum([bits[k] for k in GATED], axis=0, dtype=np.float64)
-        warned: BoolArray = np.asarray((count > 0) & ~np.isnan(x))
+        warned: BoolArray = np.asarray((count > 0) & (stopped | ~np.isnan(x)))
         active, self._hold = hold_on(warned, self._hold, seconds=HOLD, dt=self._dt)
         name = self._setup.detector.name
-        track = Track(name, None, None, "-", np.where(np.isnan(x), np.nan, count), 1.0, active)
+        track = Track(name, None, None, "-", np.where(np.isnan(x) & ~stopped, np.nan, count), 1.0, active)
         evidence: dict[str, Any] = {
             "v_x": ("first", f["v_x_hat"]),
             "slip_min": ("min", found.slip_min),
             "delta_a_x_max": ("max", scene.unbraked_resistance),
             **{f"criterion_{k}": ("any", b) for k, b in bits.items()},
             **{f"at_start_{k}": ("at_start", b) for k, b in bits.items()},
-            "full": ("any", found.is_full),
-            AFTER: ("last", after),
+            "full": ("any", found.is_full | stopped),
+            AFTER: ("last", np.where(recent, np.minimum(after, HOLD), after)),
         }
         features = {f"criterion_{k}": b.astype(np.float64) for k, b in found.met.items()}
         features["joint_gate"] = gate.astype(np.float64)
@@ -159,6 +165,24 @@ class JointCriteriaWatch:
         dropped = np.any([np.zeros(scene.size, dtype=bool), *(t.active for t in slopes)], axis=0)
         allowed, self._surface = other_surface.scan(self._other, self._surface, x, scene.f["v_x_hat"], dropped, loss)
         return allowed
+
+    def _stopped_by_water(self, scene: Scene) -> BoolArray:
+        """Where a braked wheel slides and goes on slowing down although its brake is let off. (n,)
+
+        A road, and be it ice, turns such a wheel up again: its friction is a negative traction. Only water stops it.
+        """
+        f, stopped = scene.f, np.zeros(scene.size, dtype=bool)
+        for w in scene.wheels:
+            if f"mu_{w}" not in f:
+                continue
+            with np.errstate(invalid="ignore"):
+                slides = scene.braking[w] & (f["v_x_hat"] > V_STOPPED) & (f["a_kin_slow"] > A_STOPPED)
+                slides &= slip_of_wheel_speed(f[f"v_w_{w}"], f["v_x_hat"]) < SLIP_STOPPED
+                slows = slides & (f[f"mu_{w}"] > 0.0)
+            least = max(2, round(HELD_S / self._dt))
+            bits, self._stopped[w] = lasting(slows, self._stopped[w], least=least, stays=slides)
+            stopped |= bits
+        return stopped
 
     def _began_free(self, track: Track, scene: Scene) -> BoolArray:
         if track.detector not in _OF_WHEELS or track.wheel is None:

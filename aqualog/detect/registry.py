@@ -39,8 +39,8 @@ def all_of(*kinds: Kind) -> tuple[Detector, ...]:
     return tuple(d for d in BY_NAME.values() if d.kind in kinds)
 
 
-OWN: tuple[Kind, ...] = ("effect", "joint")
-"""Kinds that run on every drive: the thesis' own."""
+OWN: tuple[Kind, ...] = ("effect", "joint", "warning")
+"""Kinds that run on every drive: the thesis' own, and the warning before."""
 
 DETECTORS = tuple(d.name for d in all_of(*OWN))
 """Names of these."""

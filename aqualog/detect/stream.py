@@ -70,8 +70,7 @@ class DriveStream:
         self.memory = memory or Memory()
         self._features = FeatureStream(vehicle, dt, available, correct_yaw=settings.correct_yaw)
         self._available = self._features.available
-        usual = all_of(*OWN, "warning") if settings.warns else all_of(*OWN)
-        chosen = tuple(usual if detectors is None else detectors)
+        chosen = tuple(all_of(*OWN) if detectors is None else detectors)
         unavailable, limited = check_needs(vehicle, available, rate_hz=1e9 / dt_ns, detectors=chosen)
         self.unavailable: tuple[Unavailable, ...] = tuple(unavailable)
         self.limited: tuple[Unavailable, ...] = tuple(limited)
@@ -139,8 +138,7 @@ class Through:
         self._checks.push(columns, piece.features)
         self._events += piece.events
         self._way.push(piece.features["v_x_hat"])
-        warned = next((t.active for t in piece.tracks if t.detector == MARGIN.name), None)
-        self._least.push(piece.features, warned)
+        self._least.push(piece.features, next((t for t in piece.tracks if t.detector == MARGIN.name), None))
         joint = (t for t in piece.tracks if t.detector in JOINT)
         self._judged += max((int(np.count_nonzero(~np.isnan(t.statistic))) for t in joint), default=0)
         return piece

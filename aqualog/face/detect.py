@@ -242,7 +242,6 @@ def detect(
     history: PathLike | None = None,
     configuration: str = "",
     reference: str = "robust",
-    margin: bool = False,
     windows: PathLike | None = None,
     whole: bool = False,
     samples: bool = True,
@@ -267,8 +266,6 @@ def detect(
         What the dry slope belongs to: tyre, pressure, load, in any words; default the vehicle's name.
     reference : str
         Dry slope of the history: `robust` (upper quartile of the periods' means) or `max` (as the thesis).
-    margin : bool
-        Whether to estimate the distance to full aquaplaning too. It is on trial: rough asphalt makes it warn.
     windows : str or Path, optional
         Folder for `signals.parquet` of a drive that is too long for memory: its samples are written while it is read.
     whole : bool
@@ -297,10 +294,6 @@ def detect(
         from aqualog.config.thresholds import load_settings
 
         settings = load_settings(file_of(thresholds, "thresholds"))
-    if margin:
-        from aqualog.detect.detector import Settings
-
-        settings = replace(settings or Settings(), warns=True)
     known = model_of(model)
     asked = (("writing a log", whole), ("a model", known is not None), ("a history", history is not None))
     needs = ", ".join(n for n, is_asked in asked if is_asked)

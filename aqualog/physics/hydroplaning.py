@@ -24,9 +24,7 @@ __all__ = [
     "depth_factor",
     "full_aquaplaning_speed",
     "gallaway_speed",
-    "gengenbach_speed",
     "horne_speed",
-    "horne_spin_up_speed",
     "horne_truck_speed",
     "pavdrn_speed",
     "usf_speed",
@@ -63,16 +61,6 @@ def horne_speed(p: FloatArray) -> FloatArray:
     [yager1983]. Maleska et al. 2021 [maleska2021] do not confirm this equation, but `horne_truck_speed`.
     """
     return 9.0 * np.sqrt(p / PSI) * KNOT
-
-
-def horne_spin_up_speed(p: FloatArray) -> FloatArray:
-    """Speed below which a wheel that stands still spins up again on a flooded road, v = 7.7 sqrt(p) kn, p in psi.
-
-    As `horne_speed`; the ratio of both, `SPIN_UP_RATIO`, is the hysteresis of the recovery.
-
-    Source: [yager1983].
-    """
-    return 7.7 * np.sqrt(p / PSI) * KNOT
 
 
 def horne_truck_speed(p: FloatArray, *, aspect: float) -> FloatArray:
@@ -173,32 +161,6 @@ def usf_speed(h_w: FloatArray, p: FloatArray, F_z: FloatArray) -> FloatArray:
     Source: as commonly quoted (K) from [gunaratne2012].
     """
     return F_z**0.2 * np.sqrt(p * 1e-3) * (0.82 / (h_w * 1e3) ** 0.06 + 0.49) * KMH
-
-
-def gengenbach_speed(h_w: FloatArray, F_z: FloatArray, *, width: float, lift_coefficient: float) -> FloatArray:
-    """Hydroplaning speed after Gengenbach, v = 508 sqrt(Q / (B h C_L)) km/h, with Q in kp, B and h in mm.
-
-    Parameters
-    ----------
-    h_w : array
-        Water film, > 0. [m]
-    F_z : array
-        Wheel load. [N]
-    width : float
-        Width of the contact. [m]
-    lift_coefficient : float
-        C_L of the tyre, by experiment. [-]
-
-    Returns
-    -------
-    v : array
-        [m/s]
-
-    A momentum balance: v ~ 1 / sqrt(h).
-
-    Source: as commonly quoted (K) from [gengenbach1968].
-    """
-    return 508.0 * np.sqrt(F_z / 9.80665 / (width * 1e3 * h_w * 1e3 * lift_coefficient)) * KMH
 
 
 def depth_factor(h_w: FloatArray | float, *, thin_gain: FloatArray | float, h_bulk: float) -> FloatArray | float:

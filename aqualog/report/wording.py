@@ -40,7 +40,7 @@ def _detectors() -> Mapping[str, Detector]:
     # the registry compiles the detectors, which takes longer than any page that names none
     from aqualog.detect.registry import OWN, all_of
 
-    return {d.name: d for d in all_of(*OWN, "warning")}
+    return {d.name: d for d in all_of(*OWN)}
 
 
 def detector_name(detector: str) -> str:

@@ -23,7 +23,6 @@ from aqualog.align.load import load_signals
 from aqualog.config.scenario import load_scenario
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.notation import WHEELS
-from aqualog.detect.detector import Settings
 from aqualog.detect.stream import detect_drive
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
@@ -46,7 +45,7 @@ def sample():
     signals = load_signals([SAMPLES / "lane_drive.mf4"], vehicle=car)
     return (
         signals.array("on_water"),
-        detect_drive(signals, car, settings=Settings(warns=True)),
+        detect_drive(signals, car),
         np.arange(signals.frame.height) * signals.dt,
     )
 
@@ -211,7 +210,7 @@ def margin():
     for name, colour in (("_low", MUTED), ("_q25", WATER), ("", INK), ("_q75", WATER), ("_high", MUTED)):
         line(fig, 1, t, 3.6 * f[f"aquaplaning_margin{name}"].to_numpy(), name.strip("_") or "median", colour, width=1.2)
     line(fig, 2, t, track(result, "margin").statistic, "below 30 km/h", INK, width=1.2)
-    level(fig, 2, 0.5, "threshold 0.5")
+    level(fig, 2, 0.25, "threshold 0.25")
     return fig.update_xaxes(range=(6.0, 20.0))
 
 

@@ -3,6 +3,7 @@
 python -m tests.detect.episode_study --passes 300 --first 1000
 python -m tests.detect.episode_study --dry-hours 20 --first 1000
 python -m tests.detect.episode_study --dry-hours 20 --first 1000 --others    # with snow, ice, gravel and damp roads
+python -m tests.detect.episode_study --stops 100 --first 1000                # antilock braking into water, and elsewhere
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from aqualog.evaluate.drives import labels_in
 from aqualog.evaluate.labels import overlaps
 from aqualog.model.drawing import KMH, SCORING_POOL, TUNING_POOL, Drawing
 from aqualog.model.log import as_signals
+from aqualog.model.scenario import Lane
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SITUATIONS, believed_vehicle, draw
 from aqualog.model.situations_made import _lane, _water
@@ -47,12 +49,17 @@ class Pass:
         return [(b[0] - a[0], b[1] - a[1]) for a, b in zip(self.lanes, self.found, strict=True)]
 
 
-def scenario(seed: int, pool):
-    """A drive at a constant speed over one to three lanes, as on a proving ground."""
-    rng = np.random.default_rng([seed + pool.seed_offset, zlib.crc32(b"lanes")])
+def _drawn(name: str, seed: int, pool):
+    """Random numbers, and a drawing with its depth of water [m] and speed of full aquaplaning. [m/s]"""
+    rng = np.random.default_rng([seed + pool.seed_offset, zlib.crc32(name.encode())])
     vehicle = pool.vehicles[int(rng.integers(len(pool.vehicles)))]
     drawing = Drawing(rng, pool, vehicle, pool.tyres[0], pool.pressures[0], int(rng.integers(2**31)))
-    k, depth, v_full = _water(drawing)
+    return rng, *_water(drawing)
+
+
+def scenario(seed: int, pool):
+    """A drive at a constant speed over one to three lanes, as on a proving ground."""
+    rng, k, depth, v_full = _drawn("lanes", seed, pool)
     v = v_full + k.between(*SPEED_KMH) * KMH
     t, lanes = k.between(10.0, 20.0), []
     for _ in range(k.one_of(1, 2, 3)):
@@ -60,7 +67,7 @@ def scenario(seed: int, pool):
         lanes.append(_lane(k, v * t, v * seconds, depth))
         t += seconds + k.between(*DRY_GAP_S)
     drive = k.drive(t + 4.0, ((0.0, v),), lanes=tuple(lanes))
-    note = f"{vehicle.name}, {k.tyre.name}, {depth * 1e3:.1f} mm, {v / KMH:.0f} of {v_full / KMH:.0f} km/h"
+    note = f"{k.vehicle.name}, {k.tyre.name}, {depth * 1e3:.1f} mm, {v / KMH:.0f} of {v_full / KMH:.0f} km/h"
     return drive, believed_vehicle(drive, rng), f"{seed}: {note}"
 
 
@@ -84,9 +91,60 @@ def dry(name: str, seed: int, pool):
     return signals.duration_s, [(drawn.note, e) for e in judgement.of("aquaplaning")]
 
 
+def stop_scenario(road: str, seed: int, pool):
+    """A stop whose brake is asked for 3 to 10 m/s², into a lane of water, onto another road (`entry`), or on `road`."""
+    rng, k, depth, v_full = _drawn(f"stop {road}", seed, pool)
+    v = v_full + k.between(-15.0, 20.0) * KMH if road == "water" else k.between(70.0, 130.0) * KMH
+    t, wish, low = k.between(9.0, 14.0), k.between(3.0, 10.0), 30.0 * KMH
+    torque, end = wish * k.vehicle.mass * k.vehicle.r_e_f, t + (v - low) / min(wish, 8.0)
+    begin = v * (t + k.between(-1.0, 0.5))
+    if road == "water":
+        lanes = (_lane(k, begin, v * k.between(0.8, 2.5), depth),)
+    else:
+        name = {"entry": k.one_of("snow", "ice", "gravel"), "split": "ice"}.get(road, road)
+        surface = k.surface(name, {"snow": pool.snow, "ice": pool.ice, "damp": pool.damp}.get(name))
+        other = k.surface("asphalt") if road == "split" else None
+        lanes = (Lane(begin if road == "entry" else 0.0, 1e5, True, surface=surface, surface_right=other),)
+    speed = ((0.0, v), (t, v), (end, low), (end + 8.0, low))
+    brake = ((0.0, 0.0), (t, 0.0), (t + 0.2, torque), (end, torque), (end + 0.2, 0.0))
+    drive = k.drive(end + 8.0, speed, lanes=lanes, brake_torque=brake, antilock=True)
+    return (
+        drive,
+        believed_vehicle(drive, rng),
+        f"{road} {seed}, {k.vehicle.name}, {v / KMH:.0f} of {v_full / KMH:.0f} km/h",
+    )
+
+
+def stop(road: str, seed: int, pool):
+    """Delays of the first joint warning behind full and partial aquaplaning [s] (NaN: none), and false episodes."""
+    drive, believed, note = stop_scenario(road, seed, pool)
+    signals = as_signals(simulate(drive), vehicle=believed)
+    labels, found = labels_in(signals), detect_drive(signals, believed, samples=False)
+    joint = [e for e in found.events if e.detector.startswith("joint")]
+    begun = [spans[0][0] if (spans := labels.of(effect)) else np.nan for effect in ("full", "partial")]
+    delays = [min((e.start_s - t for e in joint if e.end_s > t), default=np.inf) if t == t else t for t in begun]
+    wet, said = labels.water_widened, found.judgement.of("aquaplaning")
+    false = [(note, e) for e in said if not overlaps((e.start_s, e.end_s), wet)]
+    return delays, false, signals.duration_s
+
+
+ROADS = ("water", "asphalt", "damp", "snow", "ice", "gravel", "split", "entry")
 NUISANCES = tuple(n for n, s in SITUATIONS.items() if s.kind == "nuisance")
 _OTHER_ROADS = ("damp", "snow", "ice", "gravel", "split")
 DRY = tuple(n for n in NUISANCES if not any(road in n for road in _OTHER_ROADS))
+
+
+def alarms(hours: float, first: int, pool, names=DRY):
+    """Seconds of dry drives, and their episodes of aquaplaning."""
+    seconds, found, seed = 0.0, [], first
+    while seconds < 3600.0 * hours:
+        for name in names:
+            t, wrong = dry(name, seed, pool)
+            seconds, found = seconds + t, found + wrong
+            for note, e in wrong:
+                print(name, seed, note, f"{e.start_s:.1f}-{e.end_s:.1f}", e.decided_by, flush=True)
+        seed += 1
+    return seconds, found
 
 
 def main() -> None:
@@ -94,6 +152,7 @@ def main() -> None:
     parser.add_argument("--passes", type=int, default=0)
     parser.add_argument("--dry-hours", type=float, default=0.0)
     parser.add_argument("--others", action="store_true")
+    parser.add_argument("--stops", type=int, default=0)
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--pool", choices=tuple(POOLS), default="scoring")
     a = parser.parse_args()
@@ -113,16 +172,15 @@ def main() -> None:
               f"number right in {np.mean([x.is_counted for x in done]):.1%}; "
               f"begin within 1 s {inside[:, 0].mean():.1%}, median {np.median(edges[:, 0]):+.2f} s; "
               f"end {inside[:, 1].mean():.1%}, median {np.median(edges[:, 1]):+.2f} s")  # fmt: skip
-    seconds, alarms = 0.0, 0
-    while seconds < 3600.0 * a.dry_hours:
-        for name in NUISANCES if a.others else DRY:
-            t, found = dry(name, seed, pool)
-            seconds, alarms = seconds + t, alarms + len(found)
-            for note, e in found:
-                print(name, seed, note, f"{e.start_s:.1f}-{e.end_s:.1f}", e.decided_by, flush=True)
-        seed += 1
-    if seconds:
-        print(f"{seconds / 3600.0:.1f} h dry, seeds from {a.first}: {alarms} episodes of aquaplaning")
+    for road in ROADS if a.stops else ():
+        stops = [stop(road, seed, pool) for seed in range(a.first, a.first + a.stops)]
+        full, partial = np.array([x for x, _, _ in stops]).T
+        print(f"{road}: {sum(s for *_, s in stops) / 3600.0:.2f} h, full found in 0.5 s {np.sum(full <= 0.5)} of "
+              f"{np.sum(~np.isnan(full))}, partial in 2 s {np.sum(partial <= 2.0)} of {np.sum(~np.isnan(partial))}; false: ",
+              [(note, e.start_s, e.decided_by) for _, false, _ in stops for note, e in false], flush=True)  # fmt: skip
+    if a.dry_hours:
+        seconds, found = alarms(a.dry_hours, a.first, pool, NUISANCES if a.others else DRY)
+        print(f"{seconds / 3600.0:.1f} h dry, seeds from {a.first}: {len(found)} episodes of aquaplaning")
 
 
 if __name__ == "__main__":

@@ -15,16 +15,6 @@ def passes(n, first):
     return np.mean([one.is_counted for one in found]), np.mean(edges <= 1.0, axis=0), np.median(edges, axis=0)
 
 
-def alarms(hours, first):
-    seconds, found, seed = 0.0, [], first
-    while seconds < 3600.0 * hours:
-        for name in study.DRY:
-            t, wrong = study.dry(name, seed, study.SCORING_POOL)
-            seconds, found = seconds + t, found + wrong
-        seed += 1
-    return found
-
-
 def test_each_lane_is_an_episode_with_its_edges():
     counted, (begin, end), median = passes(20, 3000)
     assert counted >= 0.95
@@ -47,4 +37,4 @@ def test_a_dry_drive_has_no_episode_of_aquaplaning(name):
 
 @pytest.mark.nightly
 def test_a_hundred_dry_hours_have_at_most_one_episode_of_aquaplaning():
-    assert len(alarms(100.0, 4000)) <= 1
+    assert len(study.alarms(100.0, 4000, study.SCORING_POOL)[1]) <= 1

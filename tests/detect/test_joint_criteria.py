@@ -14,6 +14,7 @@ from aqualog.detect.events import EventBook
 from aqualog.detect.joint_criteria import GATE, GATE_AFTER, JOINT_CRITERIA, MAY_BE_WATER
 from aqualog.detect.joint_cusum import JOINT_CUSUM, TERMS
 from aqualog.detect.resistance import MEASURE
+from tests.detect import episode_study
 from tests.drives import CAR
 
 DT = 0.01
@@ -200,3 +201,12 @@ def test_a_slope_lost_at_low_speed_stays_anothers_until_the_road_is_dry_again():
     bits = allowed(np.full(v.size, 0.4), v, dropped, loss)
     assert not bits[300:800].any()
     assert bits[2050:].all()
+
+
+@pytest.mark.parametrize(("road", "limit"), [("water", 0.5), ("ice", np.nan)])
+def test_water_stops_a_braked_wheel_and_ice_turns_it_up_again(road, limit):
+    """Only in water a wheel slows down further while its brake is let off; the gate of the resistance is shut."""
+    for seed in range(4):
+        (full, _), false, _ = episode_study.stop(road, seed, episode_study.SCORING_POOL)
+        assert np.isnan(full) or full <= limit
+        assert not false

@@ -46,20 +46,6 @@ def run(car, columns, detectors, edges):
     return joined, sorted(events, key=repr), stream
 
 
-def test_any_cut_of_the_stream_equals_the_whole_drive(wet):
-    car, columns = wet
-    n = columns["v_x"].size
-    whole, events, stream = run(car, columns, OWN, [0, n])
-    assert {d.name for d in stream.watches} >= {d.name for d in all_of("effect") if d.name != "tie_rod"}
-    assert {e.detector for e in events} >= {"spin_down", "resistance", "joint_criteria", "joint_cusum"}
-    for edges in ([0, 1, 2, 700, 701, n], [0, *range(37, n, 307), n]):
-        parts, same, _ = run(car, columns, OWN, edges)
-        assert same == events
-        for key, (statistic, bits) in whole.items():
-            assert statistic.tobytes() == parts[key][0].tobytes(), key
-            assert (bits == parts[key][1]).all(), key
-
-
 @pytest.mark.parametrize("name", BY_NAME)
 def test_no_statistic_and_no_alarm_without_any_value(name, wet):
     """NaN rule: where all signals are missing nothing is known, and no detection begins."""

@@ -81,16 +81,6 @@ def test_sample_by_sample():
     assert_same(run(vehicle, columns, symbols, [0, n]), run(vehicle, columns, symbols, list(range(n + 1))))
 
 
-def test_cut_inside_every_event():
-    vehicle, columns, symbols = prepared("rwd")
-    n = columns["omega_fl"].size
-    whole = run(vehicle, columns, symbols, [0, n])
-    inside = sorted(
-        {round((e.start_s + e.end_s) / 2 / 0.01) for e in whole[2]} | {round(e.end_s / 0.01) for e in whole[2]}
-    )
-    assert_same(whole, run(vehicle, columns, symbols, [0, *(i for i in inside if 0 < i < n), n]))
-
-
 def test_a_drive_in_pieces_is_the_drive_in_one(monkeypatch):
     signals, _ = drive(CAR, duration_s=16.0, lanes=(lane(),), speed_kmh=((0.0, 104.0),))
     assert signals.frame.height < stream.ROWS

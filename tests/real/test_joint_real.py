@@ -1,4 +1,4 @@
-"""Joint detectors over measured dry drives.
+"""Joint detectors and the warning before them over measured dry drives.
 
 No measured drive has wheel speeds and wheel torques. The trips of the BMW have torque, acceleration and speed; wheels
 that roll with a tyre of slip slope 31 and the noise of a tooth ring are added to them, so that everything that the
@@ -46,11 +46,11 @@ def one(real_logs, trip):
 
 
 @pytest.mark.parametrize("trip", TRIPS)
-def test_no_joint_warning_on_a_dry_trip(real_logs, trip):
+def test_no_warning_on_a_dry_trip(real_logs, trip):
     result, _ = one(real_logs, trip)
     ran = {t.detector for t in result.tracks}
-    assert {"joint_criteria", "joint_cusum", "resistance", "spin_down", "spin_up"} <= ran
-    assert [e for e in result.events if e.detector.startswith("joint")] == []
+    assert {"joint_criteria", "joint_cusum", "margin", "resistance", "spin_down", "spin_up"} <= ran
+    assert [e for e in result.events if e.detector.startswith(("joint", "margin"))] == []
 
 
 def test_a_stopping_wheel_in_a_dry_trip_is_no_joint_warning_but_one_with_resistance_is(real_logs):

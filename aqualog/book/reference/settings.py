@@ -263,7 +263,7 @@ _TESTS = (
 
 def thresholds_page() -> str:
     """The page."""
-    own = [(code(d.name), d.unit, f"{d.threshold:g}", d.meaning) for d in all_of(*OWN, "warning")]
+    own = [(code(d.name), d.unit, f"{d.threshold:g}", d.meaning) for d in all_of(*OWN)]
     rivals = [(code(r.name), r.unit, f"{r.threshold:g}", f"{r.title} {r.reference}") for r in RIVALS.values()]
     joint = [(code(k.name), k.kind, str(k.default), k.meaning) for k in JOINT_KEYS]
     tuning = [(code(n), unit, _shown(getattr(TUNING, n)), meaning) for n, (unit, meaning) in TUNING_MEANINGS.items()]
@@ -275,7 +275,7 @@ def thresholds_page() -> str:
         fence(THRESHOLDS_EXAMPLE, "toml"),
         "## `[thresholds]`",
         table(("key", "unit", "default", "meaning"), own),
-        "`slip_slope_drop` lies between 0 and 1; all others are above 0.",
+        "`slip_slope_drop` and `margin` lie between 0 and 1; all others are above 0.",
         "## `[rivals]`",
         _RIVALS,
         table(("key", "unit", "default", "method"), rivals),

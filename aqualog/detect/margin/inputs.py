@@ -11,7 +11,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.detect.detector import Scene
 from aqualog.detect.margin.state import Inputs
 from aqualog.features.smoothing import UNSET, lowpass
-from aqualog.physics.load import G
+from aqualog.physics.load import wheel_loads
 
 __all__ = ["Reader"]
 
@@ -19,7 +19,8 @@ V_MIN = 5.0  # [m/s] slower, wheel speeds are too coarse
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering costs more than the balance knows
 A_MOST, A_LEAST = 0.5, -1.5  # [m/s^2] beyond, an unknown trailer shows more than water; braking
 U_MAX = 0.25  # [-] of the traction: beyond, the slip of a dry tyre is no longer a line
-JUMP = 0.03  # [-] of the traction within a tenth of a second: a gear shift, which torque signals report late
+LOAD_LEAST = 100.0  # [N] of a wheel that lifts off in a curve
+JUMP = 0.02  # [-] of the traction within a tenth of a second: a gear shift, which torque signals report late
 HOLD = 0.3  # [s] after it
 TAU_JUMP = 0.1  # [s]
 STANDS = 0.25  # [s] a wheel speed that does not change by a bit for longer has stopped coming
@@ -59,8 +60,6 @@ class Reader:
         self._slow = {"f": UNSET, "r": UNSET}
         self._left = 0
         self._stands = dict.fromkeys(WHEELS, (UNSET, 0))
-        front = vehicle.mass * G * vehicle.l_r / vehicle.wheelbase
-        self._load = {"f": 0.5 * front, "r": 0.5 * (vehicle.mass * G - front)}  # of a wheel
 
     def push(self, scene: Scene) -> Inputs:
         """Return the inputs of the next piece, (n,)."""
@@ -80,7 +79,8 @@ class Reader:
                 slip = none if front is None or rear is None else (front - rear) / v
                 small = np.maximum(np.abs(u[i]), np.abs(u[2 + i])) < U_MAX
             sides.append(np.where(trusted & small, slip, np.nan))
-        return Inputs(v, f["a_x_slow"], R, *sides, *u)
+        # of the torques, not the accelerometer: that is in the resistance too, and its noise would make a slope of them
+        return Inputs(v, f["delta_a_x"] + scene.columns["a_x"], R, *sides, *u)
 
     def _turning(self, scene: Scene, wheel: str) -> FloatArray | None:
         """Speed of a wheel on the centre line, NaN where its signal stands still. [m/s]"""
@@ -104,11 +104,15 @@ class Reader:
         return np.asarray(bits)
 
     def _traction(self, scene: Scene) -> list[FloatArray]:
-        """Torque over radius and load of each wheel. [-]"""
-        vehicle, a = self._vehicle, scene.f["a_kin_slow"]
+        """Torque over radius and load of each wheel; in a curve the outer ones carry more. [-]"""
+        vehicle, f = self._vehicle, scene.f
         none = np.zeros(scene.size)
+        loads = wheel_loads(
+            f["a_kin_slow"], f["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r, h_cg=vehicle.h_cg,
+            track=vehicle.track,
+        )  # fmt: skip
+        spin = [vehicle.inertia(w) / vehicle.r_e(w) ** 2 * f["a_kin_slow"] for w in WHEELS]
         return [
-            (scene.columns.get(f"torque_{w}", none) / vehicle.r_e(w) - vehicle.inertia(w) / vehicle.r_e(w) ** 2 * a)
-            / self._load[w[0]]
-            for w in WHEELS
+            (scene.columns.get(f"torque_{w}", none) / vehicle.r_e(w) - spin[i]) / np.fmax(loads[i], LOAD_LEAST)
+            for i, w in enumerate(WHEELS)
         ]

@@ -115,7 +115,9 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
         if n >= 3.0:
             e, h = e / n, h / n
             x[1 + i] = math.asinh(e / p.scale_D)
-            P[1 + i] = (g[2] + 2.0 * h * g[3] + h * h * g[4]) / (p.scale_D**2 + e * e)
+            # what shakes on dry road leaves the mean of few samples unsure; a slip within twice of that is none
+            noise = math.exp(g[5]) / (n * p.block)
+            P[1 + i] = (g[2] + 2.0 * h * g[3] + h * h * g[4] + noise) / (p.scale_D**2 + max(e * e - 4.0 * noise, 0.0))
             x[3 + i] = math.log(max(e2 / n - e * e, 0.0) + within / n + _LEAST) - g[5]
             P[3 + i] = g[6]
     if P[1] >= _UNKNOWN or (P[2] < _UNKNOWN and abs(x[2]) > abs(x[1])):

@@ -42,13 +42,13 @@ class FilterParams(NamedTuple):
     v_least: float = 11.0  # [m/s] slower, water does nothing that counts
     scale_R: float = 0.1  # [m/s^2] below it a feature is linear, above it logarithmic
     scale_D: float = 5.0e-4  # [-] the same of a slip
-    noise_R: float = 0.10  # [m/s^2] of a step
+    noise_R: float = 0.15  # [m/s^2] of a step; steps in a row err alike
     noise_D: float = 4.0e-4  # [-] of a step, beside what its samples scatter
     noise_M: float = 1.0  # [-] of a log variance
     offset_R: float = 0.15  # [m/s^2] before anything is known
-    share_a: float = 0.3  # [-] of the specific force: an unknown trailer or load
+    share_a: float = 0.3  # [-] of what the torques make: an unknown trailer or load
     offset_D: float = 5.0e-2  # [-] worn beside new tyres, a spare wheel
-    share_D: float = 0.15  # [-] of the slips of both axles: the file's slopes are not the tyres'
+    share_D: float = 0.25  # [-] of the slips of both axles: the file's slopes are not the tyres'
     shake: float = -14.0  # [-] log variance of a slip
     offset_M: float = 2.0  # [-]
     walk_R: float = 0.01  # [m/s^2 / sqrt(s)]
@@ -69,7 +69,8 @@ class FilterParams(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """Arrays (n,): speed [m/s]; specific force and resistance [m/s²]; of sides slip front less rear; traction. [-]
+    """Arrays (n,): speed [m/s]; acceleration that the torques make on a level dry road and resistance [m/s²]; of sides
+    slip front less rear; traction. [-]
 
     NaN where a value is unknown or not to be trusted.
     """
@@ -105,7 +106,8 @@ class Emissions(NamedTuple):
 class Filter(NamedTuple):
     """State: evidence on the full speeds, what a dry road shows, and the steps of the window.
 
-    `R` (5,): offset of the resistance [m/s²], its share of the specific force (an unknown load or trailer), covariance.
+    `R` (5,): offset of the resistance [m/s²], its share of what the torques make (an unknown load or trailer), and
+    their covariance.
     `sides` (2, 7): offset of the slip, share of the axles' slips that it is off by, covariance, log variance and its
     variance.
     """

@@ -7,10 +7,10 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
 from aqualog.core.notation import SIDES
-from aqualog.core.records import BoolArray, FloatArray, Margin
+from aqualog.core.records import FloatArray, Margin, Track
 from aqualog.core.vehicle import Vehicle
+from aqualog.detect.braking import lasting
 from aqualog.detect.detector import (
     Detector,
     Found,
@@ -29,7 +29,7 @@ from aqualog.detect.margin.state import OUTPUTS, Filter, FilterParams
 
 __all__ = ["FEATURES", "MARGIN", "Least", "MarginWatch", "params"]
 
-THRESHOLD = 0.5  # [-]
+THRESHOLD = 0.25  # [-] dry roads stay below it, and it finds passes 20 km/h away that a half does not
 NEAR = 30.0 / 3.6  # [m/s]
 STEP_S = 0.1  # of the filter
 MIN_RATE = 10.0  # [Hz]
@@ -40,15 +40,6 @@ FEATURES: Mapping[str, str] = {
     "contact_expected": "contact",
 }  # fmt: skip
 """Feature -> row of the filter. They have a value where water is probable; `water_probability` has one everywhere."""
-
-
-@compiled
-def _lasting(least, near, run):  # type: ignore[no-untyped-def]
-    out = np.empty(near.size, dtype=np.bool_)
-    for i in range(near.size):
-        run = run + 1 if near[i] else 0
-        out[i] = run >= least
-    return out, run
 
 
 def params(vehicle: Vehicle, dt: float) -> FilterParams:
@@ -81,7 +72,7 @@ class MarginWatch:
         with np.errstate(invalid="ignore"):
             wet = rows["p_water"] > PROBABLE
             near = rows["p_near"] > self._setup.threshold
-        active, self._run = _lasting(self._least, near, self._run)
+        active, self._run = lasting(near, self._run, least=self._least)
         features = {name: np.where(wet, rows[row], np.nan) for name, row in FEATURES.items()}
         margin = features["aquaplaning_margin"]
         evidence = {"v_x": ("first", v), "margin_min": ("min", margin), "contact_min": ("min", rows["contact"])}
@@ -104,18 +95,19 @@ class Least:
         self._best = (math.inf, math.nan, math.nan, math.nan)
         self._warned = math.nan
 
-    def push(self, features: Mapping[str, FloatArray], active: BoolArray | None) -> None:
-        """Take features and warning bits (n,) of the next samples."""
-        margin = features.get("aquaplaning_margin")
-        if margin is None or active is None:
+    def push(self, features: Mapping[str, FloatArray], track: Track | None) -> None:
+        """Take features (n,) and the detector's track of the next samples."""
+        if track is None:
             return
+        # a distance by the resistance alone, without a slip, is no least one
+        margin = np.where(track.statistic > 0.0, features["aquaplaning_margin"], np.nan)
         if np.isfinite(margin).any():
             i = int(np.nanargmin(margin))
             if margin[i] < self._best[0]:
                 low, high = features["aquaplaning_margin_low"][i], features["aquaplaning_margin_high"][i]
                 self._best = (float(margin[i]), float(low), float(high), (self._rows + i) * self._dt)
-        if math.isnan(self._warned) and active.any():
-            self._warned = (self._rows + int(np.argmax(active))) * self._dt
+        if math.isnan(self._warned) and track.active.any():
+            self._warned = (self._rows + int(np.argmax(track.active))) * self._dt
         self._rows += margin.size
 
     def result(self) -> Margin | None:
