@@ -16,7 +16,6 @@ __all__ = [
     "differential_slip",
     "differential_traction",
     "jacobian",
-    "linear_slip",
     "predicted_differential_slip",
     "slope_ratio",
     "speed_ratio",
@@ -122,11 +121,3 @@ def jacobian(
     Thesis [fichtinger2024]: needed for the filter of Eq. (3.20) to (3.22), not printed.
     """
     return mu_i - beta * rho_mu_j, -rho_mu_j * inverse_slope, 1.0 + 0.0 * mu_i
-
-
-def linear_slip(mu: FloatArray, *, slope: FloatArray, offset: FloatArray) -> FloatArray:
-    """Slip of a linear tyre, mu / C + delta. [-]
-
-    Thesis [fichtinger2024]: Eq. (3.14), with the sign of the offset as in its reference [15], [gustafsson1997] (E8).
-    """
-    return mu / slope + offset

@@ -24,7 +24,6 @@ __all__ = [
     "depth_factor",
     "full_aquaplaning_speed",
     "gallaway_speed",
-    "gengenbach_speed",
     "horne_speed",
     "horne_spin_up_speed",
     "horne_truck_speed",
@@ -173,32 +172,6 @@ def usf_speed(h_w: FloatArray, p: FloatArray, F_z: FloatArray) -> FloatArray:
     Source: as commonly quoted (K) from [gunaratne2012].
     """
     return F_z**0.2 * np.sqrt(p * 1e-3) * (0.82 / (h_w * 1e3) ** 0.06 + 0.49) * KMH
-
-
-def gengenbach_speed(h_w: FloatArray, F_z: FloatArray, *, width: float, lift_coefficient: float) -> FloatArray:
-    """Hydroplaning speed after Gengenbach, v = 508 sqrt(Q / (B h C_L)) km/h, with Q in kp, B and h in mm.
-
-    Parameters
-    ----------
-    h_w : array
-        Water film, > 0. [m]
-    F_z : array
-        Wheel load. [N]
-    width : float
-        Width of the contact. [m]
-    lift_coefficient : float
-        C_L of the tyre, by experiment. [-]
-
-    Returns
-    -------
-    v : array
-        [m/s]
-
-    A momentum balance: v ~ 1 / sqrt(h).
-
-    Source: as commonly quoted (K) from [gengenbach1968].
-    """
-    return 508.0 * np.sqrt(F_z / 9.80665 / (width * 1e3 * h_w * 1e3 * lift_coefficient)) * KMH
 
 
 def depth_factor(h_w: FloatArray | float, *, thin_gain: FloatArray | float, h_bulk: float) -> FloatArray | float:

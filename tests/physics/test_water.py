@@ -280,15 +280,6 @@ def test_usf_exponents():
     assert v(2 * MM, 2e5, 4000.0) < base
 
 
-def test_gengenbach_is_a_momentum_balance():
-    def v(h, F_z=4000.0, C_L=1.0):
-        return hydroplaning.gengenbach_speed(one(h), one(F_z), width=0.2, lift_coefficient=C_L)[0]
-
-    assert v(4 * MM) == pytest.approx(v(1 * MM) / 2)
-    assert v(1 * MM, 16000.0) == pytest.approx(2 * v(1 * MM))
-    assert v(1 * MM, 400 * 9.80665) / KMH == pytest.approx(508 * np.sqrt(400 / 200))
-
-
 def test_horne_for_trucks_falls_with_the_aspect_ratio():
     v = hydroplaning.horne_truck_speed(one(100 * 6894.757), aspect=1.0)[0]
     assert v == pytest.approx(79.5 * 0.44704)
@@ -472,20 +463,6 @@ def test_effective_radius_grows_by_a_quarter_per_cent():
     assert r[0] == 0.317
     assert r[2] / r[1] - 1 == pytest.approx(0.0024, abs=1e-4)
     assert (rolling.effective_radius(one(0.317), np.linspace(0, 60, 9), growth=0.0) == 0.317).all()
-
-
-def test_mf61_rolling_resistance_figures():
-    kw = {"p": 2.2e5, "p_ref": 2.2e5, "F_z_ref": 4000.0}
-    r_w = rolling.mf61_rolling_resistance(np.array([60, 100, 120]) * KMH, one(4000.0), **kw)
-    assert r_w == pytest.approx([0.0086, 0.0102, 0.0114], abs=6e-5)
-    assert 0.007 < rolling.mf61_rolling_resistance(one(0.0), one(4000.0), **kw)[0] < 0.0071
-    # the force grows less than the load; high pressure rolls easier
-    heavy = rolling.mf61_rolling_resistance(one(20.0), one(8000.0), **kw)[0]
-    base = rolling.mf61_rolling_resistance(one(20.0), one(4000.0), **kw)[0]
-    assert 2 * heavy / base == pytest.approx(2**0.9)
-    assert rolling.mf61_rolling_resistance(one(20.0), one(4000.0), **(kw | {"p": 4.4e5}))[0] == pytest.approx(
-        base * 2**-0.41
-    )
 
 
 def test_warm_up():
