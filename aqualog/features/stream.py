@@ -92,8 +92,9 @@ class FeatureStream:
         omega = np.array([get[f"omega_{w}"] for w in WHEELS])
         v_line = self._centre_line(omega * self._r_e[:, None], yaw_rate, get["steer_angle"])
         v_x, a_kin, v_w, self._velocity = observe(
-            self._velocity_params, self._velocity, get["v_x"], v_line, get["a_x"], yaw_rate, weights=self._weights
-        )
+            self._velocity_params, self._velocity, get["v_x"], v_line, get["a_x"], get["a_y"], yaw_rate,
+            weights=self._weights,
+        )  # fmt: skip
         out["v_x_hat"], out["a_kin"], out["yaw_rate_slow"] = v_x, a_kin, yaw_rate
         for i, wheel in enumerate(WHEELS):
             if f"omega_{wheel}" in self.available:
