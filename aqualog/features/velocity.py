@@ -66,7 +66,7 @@ def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams
 
 @compiled
 def _step(p, motion, kappa, age, v_ref, w, weights, a_x, a_y, yaw_rate):  # type: ignore[no-untyped-def]
-    """Process one sample: `motion` is (v, b, a, lost, v_y); `kappa`, `age` and `w` (corrected in place) the caller's arrays.
+    """Process one sample: `motion` is (v, b, a, lost, v_y); `kappa`, `age`, `w` are the caller's, changed in place.
 
     Returns the motion, and velocity and acceleration where a wheel or the reference has a value.
     """
