@@ -24,6 +24,8 @@ LANE_M = 130.0  # about 4.5 s at 100 km/h (thesis Fig. 2.25)
 RUN_OUT_S = 3.0
 LEFT_SHARE = 0.6  # the left track has significantly less water, and less even (thesis 2.1; sizes K)
 LEFT_IRREGULARITY, RIGHT_IRREGULARITY = 0.5, 0.05
+UNEVENNESS = 16e-6  # [m^3] a very good road, class A [iso8608_2016]: the proving ground's asphalt (K)
+STEERING_FRICTION = 150.0  # [N] of the rack: 100 to 200 N (K)
 
 SEDAN = Vehicle(
     name="sedan RWD", drivetrain="rwd", torque_split_rear=1.0, mass=1680.0, l_f=1.32, l_r=1.48, h_cg=0.54, track=1.55,
@@ -191,6 +193,7 @@ def _run(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str, figures
     scenario = Scenario(
         case.vehicle, TYRES[case.tyre], TYRES[case.tyre], p, p, case.load_front, case.load_rear,
         duration_s=round(duration, 2), seed=seed, speed=speed, lanes=(lane,) if depth > 0 else (), steering=steering,
+        unevenness=UNEVENNESS, steering_friction=STEERING_FRICTION,
     )  # fmt: skip
     return Run(_name(case, kmh, a, repeat, manoeuvre), scenario, manoeuvre, figures, depth)
 
@@ -230,6 +233,7 @@ def _sedan(kmh: float, *, entry_s: float, on_lane_s: float, a: float = 0.0) -> S
 def _drive(
     car: Vehicle, speed: Profile, lanes: tuple[Lane, ...], duration_s: float, seed: int, **given: Any
 ) -> Scenario:
+    given = {"unevenness": UNEVENNESS, "steering_friction": STEERING_FRICTION, **given}
     return Scenario(car, WORN, WORN, LOW, LOW, duration_s=duration_s, seed=seed, speed=speed, lanes=lanes, **given)
 
 
@@ -253,11 +257,14 @@ def _two_accelerations() -> Scenario:
 
 
 def _slalom() -> Scenario:
-    """Slalom of 2 m/s² and 4 s, almost constant speed; water at 23 s, left from 26 s, right from 27 s on (C63)."""
+    """Slalom of 2 m/s² and 4 s, almost constant speed; water at 23 s, left from 26 s, right from 27 s on (C63).
+
+    At 23 s the left track has less water, as on all lanes.
+    """
     v = 112 * KMH
     steering = Steering(slalom_angle(SUV_REAR, WORN, v, 2.0), 4.0, 2.0)
     lanes = (
-        Lane(22.9, 23.3, depth_left=1.6e-3, depth_right=1.6e-3),
+        Lane(22.9, 23.3, depth_left=LEFT_SHARE * 1.6e-3, depth_right=1.6e-3),
         Lane(26.0, 27.1, depth_left=1.2e-3, depth_right=0.3e-3),
         Lane(27.1, 29.0, depth_left=1.2e-3, depth_right=1.6e-3),
     )

@@ -403,7 +403,7 @@ def _not_unique(plan: Plan) -> Check:
     """C57: roads that yield lower the slope; results of the drop alone and of the joint detector."""
     rows = {}
     for name in _YIELDING:
-        found = [variants(d.name, d.seed) for d in drives((name,), plan, 6 if name == "snow_entry" else 3)]
+        found = [variants(d.name, d.seed) for d in drives((name,), plan, 12)]
         rows[name] = (len(found), *(sum(bool(v[k].any()) for v in found) for k in ("slope", "joint_criteria")))
     n, drops, joint = (sum(r[i] for r in rows.values()) for i in range(3))
     whole = drops >= 0.5 * n and joint <= 0.05 * n
