@@ -25,7 +25,6 @@ __all__ = [
     "full_aquaplaning_speed",
     "gallaway_speed",
     "horne_speed",
-    "horne_spin_up_speed",
     "horne_truck_speed",
     "pavdrn_speed",
     "usf_speed",
@@ -62,16 +61,6 @@ def horne_speed(p: FloatArray) -> FloatArray:
     [yager1983]. Maleska et al. 2021 [maleska2021] do not confirm this equation, but `horne_truck_speed`.
     """
     return 9.0 * np.sqrt(p / PSI) * KNOT
-
-
-def horne_spin_up_speed(p: FloatArray) -> FloatArray:
-    """Speed below which a wheel that stands still spins up again on a flooded road, v = 7.7 sqrt(p) kn, p in psi.
-
-    As `horne_speed`; the ratio of both, `SPIN_UP_RATIO`, is the hysteresis of the recovery.
-
-    Source: [yager1983].
-    """
-    return 7.7 * np.sqrt(p / PSI) * KNOT
 
 
 def horne_truck_speed(p: FloatArray, *, aspect: float) -> FloatArray:

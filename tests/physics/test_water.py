@@ -245,13 +245,6 @@ def test_horne_figures():
     assert hydroplaning.horne_speed(one(2e5))[0] / KMH == pytest.approx(6.36 * np.sqrt(200), rel=2e-3)
 
 
-def test_horne_hysteresis():
-    p = np.array([1.8e5, 2.5e5])
-    ratio = hydroplaning.horne_spin_up_speed(p) / hydroplaning.horne_speed(p)
-    assert ratio == pytest.approx(0.856, abs=1e-3)
-    assert ratio == pytest.approx(hydroplaning.SPIN_UP_RATIO, rel=1e-12)
-
-
 def test_pavdrn_figures():
     v = hydroplaning.pavdrn_speed(np.array([0.6, 0.8, 1.1, 1.3, 2.0]) * MM)
     assert v / KMH == pytest.approx([111, 103, 95, 91, 81], abs=0.7)

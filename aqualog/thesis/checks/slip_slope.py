@@ -14,28 +14,16 @@ from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.detect.slip_slope.history import History, Rule, remembered
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import detect_drive
-from aqualog.model.drawing import SCORING_POOL
+from aqualog.model.drawing import KMH, SCORING_POOL
 from aqualog.model.effects import EFFECTS
-from aqualog.model.programme import scene
+from aqualog.model.programme import SEDAN, scene
 from aqualog.model.scenario import SURFACES, Lane, Profile, Scenario
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
 from aqualog.thesis.checks.resistance import CONFIGURATIONS, LOADED, SLOW, UNLOADED, at_speeds
 from aqualog.thesis.claims import NEEDS_DATA, Check, Checks, judge, limit
 from aqualog.thesis.evidence.drives import drives, made, variants
-from aqualog.thesis.evidence.passes import (
-    HIGH,
-    KMH,
-    LOW,
-    MEDIUM,
-    SLOPE_EDGES,
-    Pass,
-    drive_pass,
-    figures_of,
-    frictions,
-    initial_slope,
-)
-from aqualog.thesis.evidence.passes import scenario_of as pass_scenario
+from aqualog.thesis.evidence.passes import HIGH, LOW, MEDIUM, SLOPE_EDGES, Pass, drive_pass, figures_of, initial_slope
 from aqualog.thesis.evidence.scenes import MANY, SOME, SceneRun, known, run_of
 from aqualog.thesis.evidence.seeds import (
     PASS_SEEDS,
@@ -102,8 +90,7 @@ def _full_speed(p: Pass) -> float:
 def _c49(table: Table) -> Check:
     passes = [*at_speeds(WORN), *RAMPS]
     points, dry = cells_of(table, passes, "points"), cells_of(table, passes, "slope_dry")
-    _, friction = frictions(pass_scenario(WORN, 0))
-    edges = SLOPE_EDGES
+    friction, edges = SEDAN.mu_max * TYRES[WORN.tyre].wet_friction, SLOPE_EDGES
     bin_of = np.digitize(points[..., 0], edges)
 
     def slope(x: FloatArray, reference: float) -> float:

@@ -23,7 +23,7 @@ from aqualog.physics.traction import traction_coefficient
 
 __all__ = [
     "HIGH", "KMH", "LOW", "MEDIUM", "SLOPE_EDGES", "SPIN_EDGES", "SPIN_UP", "Pass", "PassFigures", "drive_pass",
-    "figures_of", "frictions", "initial_slope", "scenario_of",
+    "figures_of", "initial_slope",
 ]  # fmt: skip
 
 KMH = 1.0 / 3.6
@@ -260,24 +260,20 @@ def _slopes(
     """Slope of each rear wheel, on the lane and of the right one before it, and the points that slopes of speed bins
     are regressed from, rear right.
     """
-    found, at, friction = {}, np.flatnonzero(inner)[::_EVERY], frictions(scenario)
+    tyre = scenario.tyre_rear
+    known = scenario.vehicle.mu_max * tyre.mu_factor  # friction of the tread on dry road
+    wet = known * (tyre.wet_friction if scenario.lanes else 1.0)
+    found, at = {}, np.flatnonzero(inner)[::_EVERY]
     dry = np.flatnonzero((t > 0.5) & (t < ENTRY))[::_EVERY]
     for w in ("rl", "rr"):
         s, mu = slip_and_traction(t, c, w, scenario)
-        found["dry"] = initial_slope(s[dry], mu[dry], friction=friction[0])
+        found["dry"] = initial_slope(s[dry], mu[dry], friction=known)
         good = at[np.isfinite(s[at]) & (np.abs(s[at]) < LARGEST_SLIP)]
         enough = good.size > _LEAST
-        found[w] = initial_slope(s[good], mu[good], friction=friction[1], dry=found["dry"]) if enough else np.nan
+        found[w] = initial_slope(s[good], mu[good], friction=wet, dry=found["dry"]) if enough else np.nan
     points = np.column_stack([c["true_v_x"][at] / KMH, s[at], mu[at], c["true_slip_slope_rr"][at]])
     points[~(np.abs(points[:, 1]) < LARGEST_SLIP)] = np.nan
     return found, points
-
-
-def frictions(scenario: Scenario) -> tuple[float, float]:
-    """Friction of the rear tread on the dry road and on the lane, as a vehicle file gives it. [-]"""
-    tyre = scenario.tyre_rear
-    dry = scenario.vehicle.mu_max * tyre.mu_factor
-    return dry, dry * (tyre.wet_friction if scenario.lanes else 1.0)
 
 
 def _spins(c: Mapping[str, FloatArray], wheel: str, spinning: BoolArray) -> FloatArray:

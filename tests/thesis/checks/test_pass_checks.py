@@ -56,7 +56,7 @@ def test_a_dry_pass_shows_nothing():
 def test_a_pass_is_the_same_each_time_and_another_with_another_seed():
     a, b, c = figures_of(Pass(106), 1), figures_of(Pass(106), 1), figures_of(Pass(106), 2)
     assert a.delta_a == b.delta_a != c.delta_a
-    np.testing.assert_array_equal(a.moments, b.moments)
+    np.testing.assert_array_equal(a.spins, b.spins)
 
 
 def test_a_fast_pass_loses_the_wheel():
