@@ -41,9 +41,7 @@ THRESHOLD = 0.6  # [m/s]
 MIN_RATE = 5.0  # [Hz] a full spin-down lasts half a second and more
 HELD_S = 0.15  # [s] for which the traction stays below that: on snow it passes there for a moment (K)
 MU_SPIN_UP = 0.07  # [-] thesis 2.1: above it, spin-up is that of another slippery road (C27)
-SIDEWAYS = (
-    3.0  # [m/s^2] of drift: the tyres of a car that spins round hold it sideways, so that little is left ahead (K)
-)
+SIDEWAYS = 3.0  # [m/s^2] of drift: a car that spins round, whose tyres hold it sideways and so little ahead (K)
 SLIP_FULL = -0.25  # [-] a wheel that has lost a quarter of its speed has lost the road
 MU_FULL = 0.02  # [-] what a spinning driven wheel still transmits at full aquaplaning
 
