@@ -32,7 +32,6 @@ INPUTS = (
 TAU_YAW = 0.05  # [s] the yaw rate is differentiated with the wheel speeds
 TAU_WHEEL = 0.03  # [s] wheel acceleration
 FADE = 0.5  # [s] a yaw rate that is missing fades out of the correction
-TAU_TRACTION = 0.10  # [s] traction coefficient of a spinning wheel: its noise is that of the wheel's acceleration
 TAU_COMMON = 0.3  # [s] what all wheels share is an error of the velocity (a late reference), and slow
 TAU_LOAD = 0.10  # [s] load transfer follows the body, not the accelerometer's noise
 

@@ -398,11 +398,6 @@ def test_c47_on_one_drive():
     scenes.known.cache_clear()
 
 
-def test_every_claim_of_chapter_2_by_passes_has_a_maker():
-    wanted = {3, 4, 5, 6, *range(12, 24), *range(37, 46), *range(47, 56), 70, 78}
-    assert {int(c[1:]) for c in MAKERS} == wanted
-
-
 def test_shares_come_with_their_interval(verdict, monkeypatch):
     monkeypatch.setattr(seeds, "_MADE", {})
     monkeypatch.setattr(seeds, "figures_of", lambda p, seed: template(dips=int(seed == 1)))
