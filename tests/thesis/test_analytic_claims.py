@@ -114,16 +114,6 @@ def test_C31_roughness_that_both_axles_see_cancels():
     assert var[-1] > 10.0
 
 
-def test_C34_resistance_measure_is_positive_for_more_resistance():
-    """2.9: delta a_x = a_x,nom - a_x,meas,ESC."""
-    dry = 0.5 * CAR.drag_area * CAR.air_density * 625.0 + CAR.rolling_resistance * CAR.mass * 9.80665
-    wheel = dry * CAR.arm("rl") / 2
-    torque = {"torque_rl": np.full(300, wheel), "torque_rr": np.full(300, wheel)}
-    assert drive(**torque)["delta_a_x"][1:] == pytest.approx(0.0, abs=1e-9)
-    f = drive(**torque, a_x=np.full(300, -0.3))
-    assert f["delta_a_x"][1:] == pytest.approx(0.3, abs=2e-3)
-
-
 @pytest.mark.parametrize("a_x", [0.0, 1.0])
 def test_C35_nothing_is_missing_on_a_dry_drive(a_x):
     """2.10 on the half-car of 3.3: the wheels' inertia apart (E5), the torques explain the acceleration."""
