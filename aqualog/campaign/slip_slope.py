@@ -19,7 +19,9 @@ from aqualog.core.notation import SIDES
 from aqualog.core.records import FloatArray
 from aqualog.core.regression import NOISE_MAX, Estimate, estimate
 
-__all__ = ["LIMITS", "Limits", "SlopeRow", "SlopeTable", "contact", "fit_slope", "slip_slopes", "too_few_runs"]
+__all__ = [
+    "LIMITS", "Limits", "SlopeRow", "SlopeTable", "at_zero_slip", "contact", "fit_slope", "slip_slopes", "too_few_runs",
+]  # fmt: skip
 
 S_MAX = 0.10  # [-] a wheel with more slip spins; a lower limit would cut off small contacts (0.3 over 3 is 0.1)
 WIND_UP = 0.30  # [-] traction beyond which the curve bends, as in `aqualog slip-slope`
@@ -276,6 +278,25 @@ def contact(row: SlopeRow, dry: SlopeRow, slope: FloatArray, slope_dry: FloatArr
     """
     tangent = tangent_of(slope_dry, dry.friction[0], dry.mu_range)
     return contact_of(slope / tangent, row.friction[1], row.mu_range)
+
+
+def at_zero_slip(row: SlopeRow) -> SlopeRow:
+    """A row on water with its slopes at zero slip, C_s / F_z; as it is without a slope or a dry one.
+
+    The dry tangent times L² (2.2), with the L of `contact`: the regression line lies below, more so the more traction
+    is driven and the less contact is left. The interval is that of the wet line; the dry one is common to all speeds.
+    """
+    if not (row.told and math.isfinite(row.slope_dry)):
+        return row
+    of_dry = replace(row, mu_range=row.mu_range_dry)
+    wet = np.array([row.slope, *row.slope_ci])
+    slope, low, high = (float(x) ** 2 for x in contact(row, of_dry, wet, np.array(row.slope_dry)))
+    tangent = float(tangent_of(np.array(row.slope_dry), row.friction[0], row.mu_range_dry))
+    ratio = tangent / row.slope_dry
+    return replace(
+        row, slope=tangent * slope, slope_ci=(tangent * low, tangent * high), slope_dry=tangent,
+        slope_dry_ci=(ratio * row.slope_dry_ci[0], ratio * row.slope_dry_ci[1]),
+    )  # fmt: skip
 
 
 def _with_dry(row: SlopeRow, dry: SlopeRow | None) -> SlopeRow:

@@ -41,6 +41,7 @@ THRESHOLD = 0.6  # [m/s]
 MIN_RATE = 5.0  # [Hz] a full spin-down lasts half a second and more
 HELD_S = 0.15  # [s] for which the traction stays below that: on snow it passes there for a moment (K)
 MU_SPIN_UP = 0.07  # [-] thesis 2.1: above it, spin-up is that of another slippery road (C27)
+SIDEWAYS = 3.0  # [m/s^2] of drift: a car that spins round, whose tyres hold it sideways and so little ahead (K)
 SLIP_FULL = -0.25  # [-] a wheel that has lost a quarter of its speed has lost the road
 MU_FULL = 0.02  # [-] what a spinning driven wheel still transmits at full aquaplaning
 
@@ -134,7 +135,8 @@ def scan(
     v_x : array (n,)
         Velocity; a coarse one suffices, since it only decides the sign. [m/s]
     allowed : bool array (n,)
-        Where an alarm may begin, once that has held for `t_held` (spin-up: traction coefficient below 0.07).
+        Where an alarm may begin, once that has held for `t_held` (spin-up: traction coefficient below 0.07, and the car
+        does not spin round).
 
     Returns
     -------
@@ -174,8 +176,9 @@ class SpinWatch:
             mu = traction(f, wheel) if self._is_up else f.get(f"mu_{wheel}")
             allowed = np.ones(scene.size, dtype=bool)
             if self._is_up and mu is not None:
+                drift = f["a_y_slow"] - f["v_x_hat"] * f["yaw_rate_slow"]
                 with np.errstate(invalid="ignore"):
-                    allowed = mu < MU_SPIN_UP
+                    allowed = (mu < MU_SPIN_UP) & ~(np.abs(drift) > SIDEWAYS)
             g, bits, self._states[wheel] = scan(
                 self._params, self._states[wheel], f[f"a_w_delta_{wheel}"], f[f"v_w_delta_{wheel}"], f["v_x_hat"],
                 allowed,

@@ -32,7 +32,6 @@ INPUTS = (
 TAU_YAW = 0.05  # [s] the yaw rate is differentiated with the wheel speeds
 TAU_WHEEL = 0.03  # [s] wheel acceleration
 FADE = 0.5  # [s] a yaw rate that is missing fades out of the correction
-TAU_TRACTION = 0.10  # [s] traction coefficient of a spinning wheel: its noise is that of the wheel's acceleration
 TAU_COMMON = 0.3  # [s] what all wheels share is an error of the velocity (a late reference), and slow
 TAU_LOAD = 0.10  # [s] load transfer follows the body, not the accelerometer's noise
 
@@ -92,8 +91,9 @@ class FeatureStream:
         omega = np.array([get[f"omega_{w}"] for w in WHEELS])
         v_line = self._centre_line(omega * self._r_e[:, None], yaw_rate, get["steer_angle"])
         v_x, a_kin, v_w, self._velocity = observe(
-            self._velocity_params, self._velocity, get["v_x"], v_line, get["a_x"], yaw_rate, weights=self._weights
-        )
+            self._velocity_params, self._velocity, get["v_x"], v_line, get["a_x"], get["a_y"], yaw_rate,
+            weights=self._weights,
+        )  # fmt: skip
         out["v_x_hat"], out["a_kin"], out["yaw_rate_slow"] = v_x, a_kin, yaw_rate
         for i, wheel in enumerate(WHEELS):
             if f"omega_{wheel}" in self.available:

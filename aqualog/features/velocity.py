@@ -32,22 +32,25 @@ class VelocityParams(NamedTuple):
     tau_radius: float  # [s] time constant of the radius correction
     b_max: float  # [m/s^2] bound of the offset: mounting, drift and grade stay below
     fade: float  # [s] how long the last acceleration lasts in a gap of the accelerometer
+    tau_side: float  # [s] in which a drift to the side is forgotten: longer, and the bank of a road adds up
 
 
 class VelocityState(NamedTuple):
-    """State of the observer: v [m/s], b [m/s²], acceleration [m/s²], time without a trusted measurement [s]."""
+    """State of the observer: v [m/s], b [m/s²], acceleration [m/s²], time without a trusted measurement [s], drift to
+    the left [m/s]."""
 
     v: float
     b: float
     a: float
     lost: float
+    v_y: float
     kappa: FloatArray  # (4,) share by which a wheel's effective radius is larger than the file says
     age: FloatArray  # (4,)
 
 
 def initial_state() -> VelocityState:
     """Return the state before the first sample."""
-    return VelocityState(math.nan, 0.0, 0.0, 0.0, np.zeros(_N), np.ones(_N))
+    return VelocityState(math.nan, 0.0, 0.0, 0.0, 0.0, np.zeros(_N), np.ones(_N))
 
 
 def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams:
@@ -58,29 +61,31 @@ def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams
     """
     tau_v, tau_b = (0.25, 5.0) if has_accelerometer else (0.15, 0.3)
     k_v = gain(tau_v, dt)
-    return VelocityParams(dt, k_v, k_v / tau_b, has_accelerometer, 0.7, 0.02, 30.0, 3.0, 0.5)
+    return VelocityParams(dt, k_v, k_v / tau_b, has_accelerometer, 0.7, 0.02, 30.0, 3.0, 0.5, 2.0)
 
 
 @compiled
-def _step(p, motion, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
-    """Process one sample: `motion` is (v, b, a, lost); `kappa`, `age` and `w` (corrected in place) the caller's arrays.
+def _step(p, motion, kappa, age, v_ref, w, weights, a_x, a_y, yaw_rate):  # type: ignore[no-untyped-def]
+    """Process one sample: `motion` is (v, b, a, lost, v_y); `kappa`, `age`, `w` are the caller's, changed in place.
 
     Returns the motion, and velocity and acceleration where a wheel or the reference has a value.
     """
-    v, b, a, lost = motion
+    v, b, a, lost, v_y = motion
     for i in range(_N):
         w[i] = w[i] * (1.0 + kappa[i])
     if not p.has_accelerometer:
         a = -b
     elif not math.isnan(a_x):
-        a = a_x - b
+        drift = a_y - yaw_rate * v - v_y / p.tau_side
+        v_y = 0.0 if math.isnan(drift) else v_y + drift * p.dt
+        a = a_x - b + (0.0 if math.isnan(yaw_rate) else yaw_rate * v_y)
     else:
         a = a * (1.0 - p.dt / p.fade)  # a gap: the last acceleration fades
 
     if math.isnan(v):
         v = v_ref if not math.isnan(v_ref) else _median(w)
         if math.isnan(v):
-            return (math.nan, b, a, lost), math.nan, math.nan
+            return (math.nan, b, a, lost, v_y), math.nan, math.nan
         lost = 0.0
     else:
         v = v + a * p.dt
@@ -128,12 +133,12 @@ def _step(p, motion, kappa, age, v_ref, w, weights, a_x, yaw_rate):  # type: ign
             v = middle
             lost = 0.0
             if math.isnan(v):
-                return (math.nan, b, a, lost), math.nan, math.nan
+                return (math.nan, b, a, lost, v_y), math.nan, math.nan
 
     if v > 8.0 and abs(a) < 1.5 and not abs(yaw_rate) > 0.1:
         _learn_radii(p, kappa, age, w, v, use_reference)
     is_seen = known > 0.0 or use_reference
-    return (v, b, a, lost), (v if is_seen else math.nan), (a if is_seen else math.nan)
+    return (v, b, a, lost, v_y), (v if is_seen else math.nan), (a if is_seen else math.nan)
 
 
 @compiled
@@ -176,7 +181,7 @@ def _median(w):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _scan(p, motion, kappa, age, v_ref, v_w, weights, a_x, yaw_rate):  # type: ignore[no-untyped-def]
+def _scan(p, motion, kappa, age, v_ref, v_w, weights, a_x, a_y, yaw_rate):  # type: ignore[no-untyped-def]
     n = v_ref.size
     velocity = np.empty(n)
     acceleration = np.empty(n)
@@ -185,7 +190,9 @@ def _scan(p, motion, kappa, age, v_ref, v_w, weights, a_x, yaw_rate):  # type: i
     for k in range(n):
         for i in range(_N):
             w[i] = v_w[i, k]
-        motion, velocity[k], acceleration[k] = _step(p, motion, kappa, age, v_ref[k], w, weights, a_x[k], yaw_rate[k])
+        motion, velocity[k], acceleration[k] = _step(
+            p, motion, kappa, age, v_ref[k], w, weights, a_x[k], a_y[k], yaw_rate[k]
+        )  # fmt: skip
         for i in range(_N):
             corrected[i, k] = w[i]
     return velocity, acceleration, corrected, motion
@@ -197,13 +204,15 @@ def observe(
     v_ref: FloatArray,
     v_w: FloatArray,
     a_x: FloatArray,
+    a_y: FloatArray,
     yaw_rate: FloatArray,
     *,
     weights: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, VelocityState]:
     """Observe the velocity with bounded trust in every source.
 
-    dv/dt = a_x - b + (v_m - v) / tau_v, db/dt = -(v_m - v) / (tau_v tau_b). v_m is the reference velocity. Without one
+    dv/dt = a_x - b + yaw_rate v_y + (v_m - v) / tau_v, db/dt = -(v_m - v) / (tau_v tau_b), and of a car that slides or
+    spins round dv_y/dt = a_y - yaw_rate v - v_y / tau_side. v_m is the reference velocity. Without one
     it is the weighted mean of the wheels that agree: three or more with each other, else those that agree with the
     prediction. A wheel that spins or locks leaves the gate and no longer counts. A reference that three agreeing wheels
     contradict does not count either. Where no wheel agrees for 2 s the observer restarts.
@@ -221,6 +230,8 @@ def observe(
         Wheel speeds on the centre line. [m/s]
     a_x : array (n,)
         Accelerometer, specific force; NaN where missing. [m/s²]
+    a_y : array (n,)
+        The same to the left; where it is missing the car does not slide. [m/s²]
     yaw_rate : array (n,)
         NaN where missing. [rad/s]
     weights : array (4,)
@@ -238,6 +249,6 @@ def observe(
     """
     kappa, age = state.kappa.copy(), state.age.copy()
     velocity, acceleration, corrected, motion = _scan(
-        p, state[:4], kappa, age, v_ref, np.ascontiguousarray(v_w), weights, a_x, yaw_rate
+        p, state[:5], kappa, age, v_ref, np.ascontiguousarray(v_w), weights, a_x, a_y, yaw_rate
     )
     return velocity, acceleration, corrected, VelocityState._make((*motion, kappa, age))

@@ -7,7 +7,7 @@ import numpy as np
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "carcass_torque", "effective_radius", "load_factor", "mf61_rolling_resistance", "pressure_factor",
+    "carcass_torque", "effective_radius", "load_factor", "pressure_factor",
     "warm_up_factor",
 ]  # fmt: skip
 
@@ -33,35 +33,6 @@ def effective_radius(r_e: FloatArray, v: FloatArray, *, growth: float) -> FloatA
     Source: MF6.1 [besselink2010] for the size; the square is centrifugal force, derived.
     """
     return r_e * (1.0 + growth * v * v)
-
-
-def mf61_rolling_resistance(v: FloatArray, F_z: FloatArray, *, p: float, p_ref: float, F_z_ref: float) -> FloatArray:
-    """Rolling resistance coefficient of a published MF6.1 set (205/60R15).
-
-    Parameters
-    ----------
-    v : array
-        Speed, 0 ... 50. [m/s]
-    F_z : array
-        Wheel load, > 0. [N]
-    p, p_ref : float
-        Inflation pressure. [Pa]
-    F_z_ref : float
-        [N]
-
-    Returns
-    -------
-    r_w : array
-        0.0086, 0.0102, 0.0114 at 60, 100, 120 km/h and the references. [-]
-
-    (0.00702 + 0.001515 v/v_0 + 8.5e-5 (v/v_0)^4) (F_z/F_z0)^-0.10 (p/p_0)^-0.41, v_0 = 16.67 m/s; as a coefficient,
-    so that the exponent of the load is one less than the force's 0.90.
-
-    Source: the law of [besselink2010] with the coefficients of a published set.
-    """
-    u = v / 16.67
-    r_w: FloatArray = (0.00702 + 0.001515 * u + 8.5e-5 * u**4) * (F_z / F_z_ref) ** -0.10 * (p / p_ref) ** -0.41
-    return r_w
 
 
 def warm_up_factor(t: FloatArray, *, extra: float, time_constant: float) -> FloatArray:

@@ -15,7 +15,7 @@ from aqualog.campaign.full_speed import fit_contact, fit_half, full_speeds
 from aqualog.campaign.means import resistances, spin_ups
 from aqualog.campaign.measure import REASONS
 from aqualog.campaign.results import RunInfo, RunSamples
-from aqualog.campaign.slip_slope import Limits, slip_slopes
+from aqualog.campaign.slip_slope import Limits, at_zero_slip, slip_slopes
 from aqualog.campaign.spin_downs import minor_spin_downs
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
@@ -118,6 +118,8 @@ def test_slopes_per_bin_are_the_ones_put_in(worn):
         # the dry slope's own error is one for all rows
         assert row.contact_ratio_ci[0] * 0.97 <= L <= row.contact_ratio_ci[1] * 1.03
         assert row.contact_ratio == pytest.approx(L, abs=0.04)
+        low, high = at_zero_slip(row).slope_ci
+        assert row.slope < low <= DRY_SLOPE * L**2 <= high
     assert [r.slope for r in rows] == sorted((r.slope for r in rows), reverse=True)
     dry = next(r for r in table.dry if r.wheel == "rr")
     half = 0.5 * (1.0 / dry.slope_ci[0] - 1.0 / dry.slope_ci[1])

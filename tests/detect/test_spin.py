@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import Track
+from aqualog.detect.detector import Scene, Setup
 from aqualog.detect.events import EventBook
-from aqualog.detect.spin import HELD_S, SPIN_DOWN, SPIN_UP, SpinParams, initial_state, scan
+from aqualog.detect.spin import HELD_S, SPIN_DOWN, SPIN_UP, SpinParams, SpinWatch, initial_state, scan
+from aqualog.model.programme import SEDAN
 
 DT = 0.01
 N = 100
@@ -33,6 +36,20 @@ def test_a_spin_up_needs_lost_traction_for_a_while(length, begins):
     t = np.arange(N) * DT
     allowed = (t >= 0.4) & (t < 0.4 + length)
     assert spin(1.0, allowed).any() == begins
+
+
+@pytest.mark.parametrize(("yaw_rate", "begins"), [(0.0, True), (0.1, True), (0.5, False)])
+def test_a_car_that_spins_round_has_no_spin_up(yaw_rate, begins):
+    one = np.ones(40)
+    f = {
+        f"{n}_{w}": x * one
+        for w in WHEELS
+        for n, x in (("a_w_delta", 10.0), ("v_w_delta", 3.0), ("mu_res", 0.02), ("v_w", 23.0))
+    }
+    f |= {"v_x_hat": 20.0 * one, "a_y_slow": 0.0 * one, "yaw_rate_slow": yaw_rate * one}
+    watch = SpinWatch(Setup(SPIN_UP, SEDAN, 0.01, 0.6), sign=1.0)
+    found = watch.push(Scene(f, dict.fromkeys(WHEELS, one < 0))).found
+    assert [x.track.active.any() for x in found] == [begins, begins]
 
 
 def test_a_spin_down_does_not_wait():

@@ -1,5 +1,7 @@
 """The drives behind single figures of chapter 2: what the text tells happens in them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,8 @@ from aqualog.physics.steering import STEERING
 
 @pytest.fixture(scope="module")
 def drives():
-    return {n: simulate(scene(n)).truth for n in SCENES}
+    """Without what hides the water's part in the rods."""
+    return {n: simulate(replace(scene(n), unevenness=0.0, steering_friction=0.0)).truth for n in SCENES}
 
 
 def during(truth, name, start, end):
@@ -93,8 +96,9 @@ def test_2_22_spin_downs_and_spin_ups_raise_the_rods(drives):
 def test_2_23_loss_of_both_front_wheels_takes_the_lateral_acceleration(drives):
     t = drives["2.23"]
     assert 1.6 < np.abs(during(t, "a_y", 10.0, 22.0)).max() < 2.1
-    for wheel in ("fl", "fr"):
-        assert during(t, f"true_slip_{wheel}", 22.9, 23.5).min() < -0.05
+    right, left = (during(t, f"true_slip_{w}", 22.9, 23.5).min() for w in ("fr", "fl"))
+    assert right < -0.05
+    assert right < left < -0.02  # less water there
     assert series(t, "fl", -0.05, 26.0, 27.1) >= 2
     assert during(t, "true_slip_fr", 25.0, 27.05).min() > -0.03
     assert during(t, "true_slip_fr", 27.1, 28.0).min() < -0.05

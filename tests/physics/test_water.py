@@ -458,20 +458,6 @@ def test_effective_radius_grows_by_a_quarter_per_cent():
     assert (rolling.effective_radius(one(0.317), np.linspace(0, 60, 9), growth=0.0) == 0.317).all()
 
 
-def test_mf61_rolling_resistance_figures():
-    kw = {"p": 2.2e5, "p_ref": 2.2e5, "F_z_ref": 4000.0}
-    r_w = rolling.mf61_rolling_resistance(np.array([60, 100, 120]) * KMH, one(4000.0), **kw)
-    assert r_w == pytest.approx([0.0086, 0.0102, 0.0114], abs=6e-5)
-    assert 0.007 < rolling.mf61_rolling_resistance(one(0.0), one(4000.0), **kw)[0] < 0.0071
-    # the force grows less than the load; high pressure rolls easier
-    heavy = rolling.mf61_rolling_resistance(one(20.0), one(8000.0), **kw)[0]
-    base = rolling.mf61_rolling_resistance(one(20.0), one(4000.0), **kw)[0]
-    assert 2 * heavy / base == pytest.approx(2**0.9)
-    assert rolling.mf61_rolling_resistance(one(20.0), one(4000.0), **(kw | {"p": 4.4e5}))[0] == pytest.approx(
-        base * 2**-0.41
-    )
-
-
 def test_warm_up():
     f = rolling.warm_up_factor(np.array([0.0, 600.0, 6000.0, 1e9]), extra=0.4, time_constant=600.0)
     assert f == pytest.approx([1.4, 1 + 0.4 / np.e, 1.0, 1.0], abs=1e-4)

@@ -73,15 +73,24 @@ def scans(n, seed):
         ),
         "hold": (lambda s, z: hold_on(allowed[s], z, seconds=0.05, dt=DT), 0),
         "velocity": (
-            lambda s, z: _observe(params, z, ref[s], wheels[:, s], a[s], dv[s]),
+            lambda s, z: _observe(params, z, ref[s], wheels[:, s], a[s], other[s], dv[s]),
             velocity.initial_state(),
         ),
     }
 
 
-def _observe(params, state, ref, wheels, a_x, yaw):
-    v, a, w, state = velocity.observe(params, state, ref, wheels, a_x, yaw, weights=np.ones(4))
+def _observe(params, state, ref, wheels, a_x, a_y, yaw):
+    v, a, w, state = velocity.observe(params, state, ref, wheels, a_x, a_y, yaw, weights=np.ones(4))
     return v, a, *w, state
+
+
+def test_a_car_that_spins_round_on_ice_loses_speed_ahead_without_any_acceleration():
+    t = np.arange(0.0, 1.0, DT)
+    ref, still = np.where(t < 0.05, 15.0, np.nan), np.zeros_like(t)
+    wheels = np.array([40.0, 60.0, 80.0, 2.0])[:, None] + still  # none of them agrees with any
+    params = velocity.params_from_seconds(DT, has_accelerometer=True)
+    v, *_ = _observe(params, velocity.initial_state(), ref, wheels, still, still, 0.7 + still)
+    assert 15.0 * np.cos(0.7) < v[-1] < 13.0  # 11.5; 15 if the car were taken to go straight, the drift fades in 2 s
 
 
 @pytest.mark.parametrize("name", list(scans(10, 0)))

@@ -12,7 +12,6 @@ from aqualog.detect import minor_spin_down, spin
 from aqualog.features.stream import FeatureStream
 from aqualog.model.half_car import HalfCar, HalfCarRun, simulate_half_car
 from aqualog.model.scenario import Excitation
-from aqualog.physics.contact import friction_ratio, slip_stiffness_ratio
 from aqualog.physics.resistance import nominal_acceleration
 
 DT = 0.01
@@ -115,28 +114,6 @@ def test_C31_roughness_that_both_axles_see_cancels():
     assert var[-1] > 10.0
 
 
-def test_C34_resistance_measure_is_positive_for_more_resistance():
-    """2.9: delta a_x = a_x,nom - a_x,meas,ESC."""
-    dry = 0.5 * CAR.drag_area * CAR.air_density * 625.0 + CAR.rolling_resistance * CAR.mass * 9.80665
-    wheel = dry * CAR.arm("rl") / 2
-    torque = {"torque_rl": np.full(300, wheel), "torque_rr": np.full(300, wheel)}
-    assert drive(**torque)["delta_a_x"][1:] == pytest.approx(0.0, abs=1e-9)
-    f = drive(**torque, a_x=np.full(300, -0.3))
-    assert f["delta_a_x"][1:] == pytest.approx(0.3, abs=2e-3)
-
-
-def test_C35_nominal_acceleration_by_hand():
-    """2.10: a_nom = (sum(T_i / r_l,i - r_w,i F_z,i) - c_x v^2) / m with c_x = 1/2 c_w A rho."""
-    torque = np.array([[10.0], [20.0], [300.0], [310.0]])
-    F_z = np.array([[4100.0], [4200.0], [3900.0], [3800.0]])
-    a = nominal_acceleration(
-        torque, F_z, one(30.0), np.zeros((4, 1)), arm=np.array([0.30, 0.30, 0.31, 0.31]), inertia=np.ones(4), mass=1600.0,
-        r_w=0.01, drag_area=0.7, air_density=1.2,
-    )[0]  # fmt: skip
-    # 30/0.3 + 610/0.31 = 2067.742; 160 N of rolling; 378 N of drag
-    assert a == pytest.approx((2067.7419 - 160.0 - 378.0) / 1600.0, rel=1e-7)
-
-
 @pytest.mark.parametrize("a_x", [0.0, 1.0])
 def test_C35_nothing_is_missing_on_a_dry_drive(a_x):
     """2.10 on the half-car of 3.3: the wheels' inertia apart (E5), the torques explain the acceleration."""
@@ -157,11 +134,3 @@ def test_C35_nothing_is_missing_on_a_dry_drive(a_x):
     assert a_nom[inside] == pytest.approx(r.a_x[inside], abs=1e-5)
     printed = nominal_acceleration(torque, F_z, r.v_x, 0.0 * omega_dot, **kw)
     assert printed[inside] - r.a_x[inside] == pytest.approx(2 * 2.4 * a_x / 0.317 / 0.309 / 1650.0, abs=5e-4)
-
-
-def test_C68_half_the_slope_leaves_four_fifths_of_the_friction():
-    """2.5: "the actual slip slope decreases below half of the maximum historic value": L = 0.707, mu / mu_0 = 0.793."""
-    L = np.linspace(0.0, 1.0, 1_000_001)
-    at = L[np.argmin(np.abs(slip_stiffness_ratio(L) - 0.5))]
-    assert at == pytest.approx(0.7071, abs=1e-4)
-    assert friction_ratio(one(at))[0] == pytest.approx(0.793, abs=5e-4)

@@ -14,16 +14,16 @@ from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.detect.slip_slope.history import History, Rule, remembered
 from aqualog.detect.slip_slope.watch import Memory
 from aqualog.detect.stream import detect_drive
-from aqualog.model.drawing import SCORING_POOL
+from aqualog.model.drawing import KMH, SCORING_POOL
 from aqualog.model.effects import EFFECTS
-from aqualog.model.programme import scene
+from aqualog.model.programme import SEDAN, scene
 from aqualog.model.scenario import SURFACES, Lane, Profile, Scenario
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
 from aqualog.thesis.checks.resistance import CONFIGURATIONS, LOADED, SLOW, UNLOADED, at_speeds
 from aqualog.thesis.claims import NEEDS_DATA, Check, Checks, judge, limit
 from aqualog.thesis.evidence.drives import drives, made, variants
-from aqualog.thesis.evidence.passes import HIGH, KMH, LOW, MEDIUM, SLOPE_EDGES, Pass, drive_pass, figures_of
+from aqualog.thesis.evidence.passes import HIGH, LOW, MEDIUM, SLOPE_EDGES, Pass, drive_pass, figures_of, initial_slope
 from aqualog.thesis.evidence.scenes import MANY, SOME, SceneRun, known, run_of
 from aqualog.thesis.evidence.seeds import (
     PASS_SEEDS,
@@ -87,28 +87,29 @@ def _full_speed(p: Pass) -> float:
     return float(np.nanmedian(columns["true_full_speed_rr"])) * 3.6
 
 
-def regressed(moments: FloatArray) -> float:
-    """Slope from sums of n, mu, s, mu^2 and mu s, by regression of slip on traction. [-]"""
-    n, mu, s, mu2, mu_s = moments[:5]
-    return float((n * mu2 - mu * mu) / (n * mu_s - mu * s))
-
-
 def _c49(table: Table) -> Check:
-    moments = cells_of(table, [*at_speeds(WORN), *RAMPS], "moments")
+    passes = [*at_speeds(WORN), *RAMPS]
+    points, dry = cells_of(table, passes, "points"), cells_of(table, passes, "slope_dry")
+    friction, edges = SEDAN.mu_max * TYRES[WORN.tyre].wet_friction, SLOPE_EDGES
+    bin_of = np.digitize(points[..., 0], edges)
+
+    def slope(x: FloatArray, reference: float) -> float:
+        return initial_slope(x[:, 1], x[:, 2], friction=friction, dry=reference)
 
     def errors(rows: Rows) -> tuple[float, float, FloatArray]:
-        sums = moments[:, rows].sum(axis=(0, 1))
-        good = sums[:, 0] >= BIN_SAMPLES
-        truth = sums[good, 5] / sums[good, 0]
-        binned = np.array([regressed(x) for x in sums[good]]) / truth - 1.0
-        whole = regressed(sums[good].sum(axis=0)) / truth - 1.0
+        some, where, reference = points[:, rows], bin_of[:, rows], float(np.mean(dry[:, rows]))
+        parts = [some[where == k] for k in range(1, edges.size)]
+        parts = [x for x in parts if x.shape[0] >= BIN_SAMPLES]
+        truth = np.array([x[:, 3].mean() for x in parts])
+        binned = np.array([slope(x, reference) for x in parts]) / truth - 1.0
+        whole = slope(np.concatenate(parts), reference) / truth - 1.0
         return float(np.sqrt(np.mean(binned**2))), float(np.sqrt(np.mean(whole**2))), binned
 
-    n = moments.shape[1]
+    n = points.shape[1]
     value, ci = estimate(lambda r: errors(r)[0], n)
     without, ci_without = estimate(lambda r: errors(r)[1], n)
     binned = errors(np.arange(n))[2]
-    at = (SLOPE_EDGES[:-1] + 5.0)[moments.sum(axis=(0, 1))[:, 0] >= BIN_SAMPLES]
+    at = [v for k, v in enumerate(edges[:-1] + 5.0) if np.count_nonzero(bin_of == k + 1) >= BIN_SAMPLES]
     whole, part = value < BIN_ERROR and value < 0.5 * without, value < without
     outcome = (
         f"rms error {told(100 * value, (100 * ci[0], 100 * ci[1]))} % in bins, "
@@ -389,7 +390,7 @@ def _not_unique(plan: Plan) -> Check:
     """C57: roads that yield lower the slope; results of the drop alone and of the joint detector."""
     rows = {}
     for name in _YIELDING:
-        found = [variants(d.name, d.seed) for d in drives((name,), plan, 6 if name == "snow_entry" else 3)]
+        found = [variants(d.name, d.seed) for d in drives((name,), plan, 12)]
         rows[name] = (len(found), *(sum(bool(v[k].any()) for v in found) for k in ("slope", "joint_criteria")))
     n, drops, joint = (sum(r[i] for r in rows.values()) for i in range(3))
     whole = drops >= 0.5 * n and joint <= 0.05 * n

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.campaign.expected import contact_of, tangent_of
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.evaluate.labels import CONTACT_PARTIAL, PARTIAL_S, spans_of
@@ -22,7 +23,7 @@ from aqualog.physics.traction import traction_coefficient
 
 __all__ = [
     "HIGH", "KMH", "LOW", "MEDIUM", "SLOPE_EDGES", "SPIN_EDGES", "SPIN_UP", "Pass", "PassFigures", "drive_pass",
-    "figures_of",
+    "figures_of", "initial_slope",
 ]  # fmt: skip
 
 KMH = 1.0 / 3.6
@@ -133,18 +134,36 @@ def slip_and_traction(
     return np.asarray(s, dtype=np.float64), np.asarray(mu, dtype=np.float64)
 
 
-def slope_of(s: FloatArray, mu: FloatArray) -> float:
-    """Slip slope by regression of slip on traction, for slip is the noisy one; arrays (n,). [-]"""
-    A = np.column_stack([mu, np.ones_like(mu)])
-    k, _ = np.linalg.lstsq(A, s, rcond=None)[0]
-    return float(1.0 / k)
+def initial_slope(s: FloatArray, mu: FloatArray, *, friction: float, dry: float | None = None) -> float:
+    """Slip slope at zero slip of points of a brush whose friction is known.
+
+    Parameters
+    ----------
+    s, mu : array (n,)
+        Slip and traction coefficient; n > 1 and mu varies. [-]
+    friction : float
+        Of the tread on this road. [-]
+    dry : float, optional
+        Initial slope of the full contact; without it these points are from one. [-]
+
+    Slip, the noisy one, is regressed on traction. The line lies below the initial slope, because the curve bends (E22).
+    Friction and range of the traction say by how much; the contact that has this line is found as in a campaign.
+    """
+    k = float(np.linalg.lstsq(np.column_stack([mu, np.ones_like(mu)]), s, rcond=None)[0][0])
+    low, high = (float(x) for x in np.quantile(mu, (0.05, 0.95)))
+    if high - low < LEAST_RANGE or k <= 0.0:
+        return np.nan
+    if dry is None:
+        return float(tangent_of(np.array(1.0 / k), friction, (low, high)))
+    return dry * float(contact_of(np.array(1.0 / (k * dry)), friction, (low, high))) ** 2
 
 
 GONE, STILL = 0.01, 5.0  # contact that counts as none [-], turning that counts as none [rad/s]
 SPIN_EDGES = np.arange(80.0, 160.0, 10.0)  # [km/h] bins of Figure 2.7
 SLOPE_EDGES = np.arange(60.0, 115.0, 10.0)  # [km/h] bins of Figures 2.17 to 2.20
 LARGEST_SLIP = 0.1  # [-] of a point that a slope is regressed from
-_EVERY = 10  # rows between points of a regression: 10 ms
+LEAST_RANGE = 0.02  # [-] of the traction, 5 to 95 %
+_EVERY, _LEAST = 10, 10  # rows between points of a regression, 10 ms; points that one needs
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,10 +195,11 @@ class PassFigures:
     rise_s: float  # resistance beyond half of its mean on the lane
     lever: float  # torque of the water against the front right wheel over its load [m]
     yaw: float  # largest heading on the lane [rad]
-    slope_rl: float  # slip slope by regression [-]
+    slope_rl: float  # slip slope at zero slip [-]
     slope_rr: float
+    slope_dry: float  # the same before the entry, rear right
     spins: FloatArray  # (2, bins of SPIN_EDGES, 2): samples and sum of the traction coefficient in spin-ups, rl and rr
-    moments: FloatArray  # (bins of SLOPE_EDGES, 6): n, sums of mu, s, mu^2, mu s, and of the true slope, rr
+    points: FloatArray  # (m, 4): speed [km/h], slip, traction, true slope, rear right every 10 ms; NaN where it spins
 
 
 def figures_of(p: Pass, seed: int) -> PassFigures:
@@ -203,7 +223,7 @@ def figures_of(p: Pass, seed: int) -> PassFigures:
     spun = "rl" if slip["rl"][k] > slip["rr"][k] else "rr"
     dt = float(t[1] - t[0])
     partial = (s for w in WHEELS for s in spans_of(t, c[f"true_contact_{w}"] < CONTACT_PARTIAL))
-    slopes, moments = _slopes(t, c, scenario, inner)
+    slopes, points = _slopes(t, c, scenario, inner if p.wiggles else np.zeros_like(inner))
     return PassFigures(
         dips=len(dips),
         depth=float(np.median([d for _, d in dips])) if dips else np.nan,
@@ -228,29 +248,32 @@ def figures_of(p: Pass, seed: int) -> PassFigures:
         yaw=float(np.abs(np.cumsum(c["yaw_rate"]) * dt)[on].max()),
         slope_rl=slopes["rl"],
         slope_rr=slopes["rr"],
+        slope_dry=slopes["dry"],
         spins=np.stack([_spins(c, w, on & (slip[w] > SPIN_UP)) for w in ("rl", "rr")]),
-        moments=moments,
+        points=points,
     )
 
 
 def _slopes(
     t: FloatArray, c: Mapping[str, FloatArray], scenario: Scenario, inner: BoolArray
 ) -> tuple[dict[str, float], FloatArray]:
-    """Slope of each rear wheel, and the sums that slopes of speed bins are regressed from, rear right."""
-    found = {}
-    moments = np.zeros((SLOPE_EDGES.size - 1, 6))
+    """Slope of each rear wheel, on the lane and of the right one before it, and the points that slopes of speed bins
+    are regressed from, rear right.
+    """
+    tyre = scenario.tyre_rear
+    known = scenario.vehicle.mu_max * tyre.mu_factor  # friction of the tread on dry road
+    wet = known * (tyre.wet_friction if scenario.lanes else 1.0)
+    found, at = {}, np.flatnonzero(inner)[::_EVERY]
+    dry = np.flatnonzero((t > 0.5) & (t < ENTRY))[::_EVERY]
     for w in ("rl", "rr"):
         s, mu = slip_and_traction(t, c, w, scenario)
-        good = np.flatnonzero(inner & np.isfinite(s) & (np.abs(s) < LARGEST_SLIP))
-        found[w] = slope_of(s[good][::_EVERY], mu[good][::_EVERY]) if good.size > 100 else np.nan
-        if w == "rr" and good.size:
-            at = good[::_EVERY]
-            parts = np.column_stack([np.ones(at.size), mu[at], s[at], mu[at] ** 2, mu[at] * s[at],
-                                     c["true_slip_slope_rr"][at]])  # fmt: skip
-            bins = np.digitize(c["true_v_x"][at] / KMH, SLOPE_EDGES) - 1
-            inside = (bins >= 0) & (bins < moments.shape[0])
-            np.add.at(moments, bins[inside], parts[inside])
-    return found, moments
+        found["dry"] = initial_slope(s[dry], mu[dry], friction=known)
+        good = at[np.isfinite(s[at]) & (np.abs(s[at]) < LARGEST_SLIP)]
+        enough = good.size > _LEAST
+        found[w] = initial_slope(s[good], mu[good], friction=wet, dry=found["dry"]) if enough else np.nan
+    points = np.column_stack([c["true_v_x"][at] / KMH, s[at], mu[at], c["true_slip_slope_rr"][at]])
+    points[~(np.abs(points[:, 1]) < LARGEST_SLIP)] = np.nan
+    return found, points
 
 
 def _spins(c: Mapping[str, FloatArray], wheel: str, spinning: BoolArray) -> FloatArray:

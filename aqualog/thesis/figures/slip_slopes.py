@@ -10,7 +10,7 @@ import numpy as np
 
 from aqualog.campaign.bins import KMH, Plan
 from aqualog.campaign.results import RunInfo
-from aqualog.campaign.slip_slope import SlopeRow, SlopeTable, slip_slopes
+from aqualog.campaign.slip_slope import SlopeRow, SlopeTable, at_zero_slip, slip_slopes
 from aqualog.report.theme import MUTED, wheel_colour
 from aqualog.thesis.catalogue import figure_of, needs_of
 from aqualog.thesis.claims import Check, judge, limit
@@ -98,8 +98,14 @@ def slope_line(name: str, rows: Sequence[SlopeRow], style: Style, *, shift: floa
 
 
 def over_speed(number: str, evidence: Evidence) -> Figure:
-    """Slopes over speed, a panel per driven wheel, with the figure's claims."""
+    """Slopes over speed at zero slip, a panel per driven wheel, with the figure's claims.
+
+    Regression lines, as they are, where a slope lacks its dry reference.
+    """
     found = measured_slopes(number, evidence)
+    told = [r for rows in found.rows.values() for r in rows if r.told]
+    if all(math.isfinite(r.contact_ratio) for r in told):
+        found = replace(found, rows={name: tuple(map(at_zero_slip, rows)) for name, rows in found.rows.items()})
     style, shift = styles(found.selected), shifts(found.levels)
     panels = []
     for wheel in found.wheels:
