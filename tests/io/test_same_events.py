@@ -213,7 +213,8 @@ def found_in(source, signal_map, dbc):
 def reference(tmp_path_factory):
     _, events = found_in(*parquet(tmp_path_factory.mktemp("reference")))
     found = {e.detector for e in events}
-    assert found == {"spin_down", "minor_spin_down", "resistance", "slip_slope_drop", "joint_criteria", "joint_cusum"}
+    joint = {"joint_criteria", "joint_cusum"}
+    assert found == {"spin_down", "minor_spin_down", "resistance", "slip_slope_drop", "margin", *joint}
     return events
 
 
