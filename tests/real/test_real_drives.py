@@ -63,7 +63,7 @@ def test_toyota_without_a_vehicle_file_cannot_be_judged(real_logs):
     assert (code, found["verdict"], found["events"]) == (0, "cannot_be_judged", [])
     assert found["missing"] == ["torque of the driven wheels", "vehicle.drivetrain", "vehicle.mass"]
     assert found["ran"] == ["spin_down"]
-    assert len(found["unavailable"]) == 7
+    assert len(found["unavailable"]) == 8
 
 
 def test_toyota_clock(real_logs):
