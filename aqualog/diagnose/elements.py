@@ -20,7 +20,7 @@ from aqualog.diagnose.competition import Block
 from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.shapes import MECHANISMS, Mechanism, Shape
 from aqualog.diagnose.spline import POINTS, Basis
-from aqualog.diagnose.steps import EDGES, OUTLIER, gain_of, intervals, trapezoid
+from aqualog.diagnose.steps import EDGES, against, clipped, gain_of, intervals, trapezoid
 
 __all__ = ["with_elements"]
 
@@ -50,10 +50,7 @@ def with_elements(arena: Arena) -> Arena:
     used = part.mask
     deviations = arena.tolerance @ arena.tolerant(arena.white())[:-1, -1]
     white = white_noise(part.residual, used, contrasts(part.channels)).rotation
-    left = white @ (part.residual - arena.made(0, deviations[None])[0])
-    # a kerb or a shift of a second is no form
-    most = OUTLIER * np.median(np.abs(left[:, used]), axis=1, keepdims=True)
-    left = np.clip(left, -most, most)
+    left = clipped(white @ (part.residual - arena.made(0, deviations[None])[0]), used)
     drive = arena.evidence.drives[part.drive]
     along = {n: drive.coordinates[n][part.at] for n in ("t", "position") if n in drive.coordinates}
     made = []
@@ -61,9 +58,7 @@ def with_elements(arena: Arena) -> Arena:
         names = [n for n in along if (n,) in m.over]
         if m.is_road or m.source not in part.responses or not names:
             continue
-        response = white @ part.responses[m.source]
-        weight = np.where(used, (response**2).sum(axis=0), 0.0)
-        score = np.where(used, (response * left).sum(axis=0), 0.0)
+        weight, score = against(white @ part.responses[m.source], left, used)
         found = [_wave(n, along[n], weight, score, used) for n in names]
         several = intervals(weight, score)
         found += [_stepped(along["t"], several[:k], weight, score) for k in sorted({1, len(several)} - {0})]

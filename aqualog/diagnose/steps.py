@@ -6,20 +6,32 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from aqualog.core.records import FloatArray
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import block_step, contrasts
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import white_noise
 from aqualog.model.effects import EFFECTS
 
-__all__ = ["EDGES", "OUTLIER", "begun", "gain_of", "intervals", "moments", "trapezoid"]
+__all__ = ["EDGES", "against", "begun", "clipped", "gain_of", "intervals", "moments", "trapezoid"]
 
 EDGES = 75  # of intervals, evenly over the drive
 OUTLIER = 6.0  # of the median size (4 standard deviations), beyond which a sample counts no more
 SHORTEST = 3  # edges from the begin of an interval to its end
 SHORTEST_S = 1.0  # of a change that begins; a faster one looks the same in blocks of 0.1 s
 INTERVALS, PART = 5, 0.1  # the most intervals of a form, each with this share of what the one before explains (K)
+
+
+def clipped(left: FloatArray, used: BoolArray) -> FloatArray:
+    """What is left in white noise (C, n), without outliers: a kerb or a shift of a second is no form."""
+    most = OUTLIER * np.median(np.abs(left[:, used]), axis=1, keepdims=True)
+    return np.asarray(np.clip(left, -most, most))
+
+
+def against(response: FloatArray, left: FloatArray, used: BoolArray) -> tuple[FloatArray, FloatArray]:
+    """Weight and score (n,) of a response among what is left (C, n), 0 where masked: a modulation m of it explains
+    (m · score)² / (m² · weight)."""
+    return np.where(used, (response**2).sum(axis=0), 0.0), np.where(used, (response * left).sum(axis=0), 0.0)
 
 
 def begun(weight: FloatArray, score: FloatArray) -> tuple[int, int]:
@@ -130,11 +142,8 @@ def moments(
     asked, signatures : sequences
         Of the other hypotheses, (k, C, n) each.
     """
-    used = drive.mask
-    white = white_noise(residual, used, contrasts(drive.channels)).rotation
-    left = white @ residual
-    most = OUTLIER * np.median(np.abs(left[:, used]), axis=1, keepdims=True)
-    left = np.clip(left, -most, most)
+    white = white_noise(residual, drive.mask, contrasts(drive.channels)).rotation
+    left = clipped(white @ residual, drive.mask)
     dt = block_step(drive.dt)
     out = []
     for effect in EFFECTS.values():
@@ -142,9 +151,7 @@ def moments(
         for h, signature in zip(asked, signatures, strict=True) if like else ():
             if h.effect.name != like or h.where is None or len(h.where) == 1:
                 continue
-            response = white @ signature[0]
-            weight = np.where(used, (response**2).sum(axis=0), 0.0)
-            score = np.where(used, (response * left).sum(axis=0), 0.0)
+            weight, score = against(white @ signature[0], left, drive.mask)
             if weight.sum() <= 0.0:
                 continue
             low, rise = begun(weight, score)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from aqualog.diagnose.arena import arena_of
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import hypotheses, residual, signatures
 from aqualog.diagnose.search import simulated
@@ -33,6 +34,9 @@ def test_one_drive_has_its_own_moments_and_several_share_some():
     evidence = simulated([one], few, Model(), lambda _t, _s: None)
     assert [h.key for h in evidence.asked[len(few) :]] == [f"pressure_loss@{w}" for w in ("fl", "fr", "rl", "rr")]
     assert len(evidence.signatures[0]) == len(evidence.asked)
+    # the price of four wheels and ten moments
+    prior = {b.key: b.log_prior for b in arena_of(evidence, ()).blocks}
+    assert prior["pressure_loss@fl"] == pytest.approx(np.log(0.03 / 40.0))
     both = [one, prepare(plain(), CAR, "b")]
     starts = {h.fixed["start"] for h in hypotheses(both, Model())[0] if h.key == "pressure_loss@fl"}
     assert len(starts) == 5

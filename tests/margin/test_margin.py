@@ -109,6 +109,13 @@ def test_without_torque_it_does_not_run():
     assert found["margin"] == ("torque_rl", "torque_rr")
 
 
+def test_a_dry_drive_has_none():
+    signals, _ = drive(CAR, duration_s=20.0, lanes=(), speed_kmh=((0.0, 80.0), (20.0, 110.0)))
+    result = detect_drive(signals, CAR)
+    assert document(result, log="x")["margin"] is None
+    assert not [e for e in result.events if e.detector == "margin"]
+
+
 @pytest.mark.parametrize(("name", "seed"), [("rough_asphalt", 30), ("torque_vectoring", 20), ("gear_shifts", 23)])
 def test_a_dry_road_is_none(name, seed):
     """Noise of the accelerometer makes no trailer, a curve loads the outer wheels, and a torque is reported late."""

@@ -296,6 +296,15 @@ def test_powers_of_ten_stay_numbers_in_plain_text():
     assert ordinary("p = 1.00·10⁻¹² at 3 m/s²") == "p = 1.00e-12 at 3 m/s²"
 
 
+def test_a_gain_depends_on_what_it_multiplies():
+    gain = replace(remainder(), mechanism="accelerometer_gain", unit="-")
+    (r,) = round_trip(document_of("unexplained", remainders=(gain,)))["unexplained"]
+    assert r["depends_on"] == ["v_x", "a_x"]
+    assert {len(x) for x in r["x"]} == {1}
+    (r,) = round_trip(document_of("unexplained", remainders=(replace(gain, mechanism="force"),)))["unexplained"]
+    assert r["depends_on"] == ["v_x"]
+
+
 def test_the_contracts_keys_are_there():
     probable = replace(MASS, probability=0.973)
     d = round_trip(document_of("unexplained", causes=(probable,)))
