@@ -2,7 +2,9 @@
 
 The geometry of curves, the height of the centre of mass, the yaw inertia, the form of a tyre's curve, offsets of
 steering and gyro. Each has the form of an effect, so that simulation gives its change of the residuals. `friction` is
-mostly the curvature of a tyre's curve well below its peak: laws go from a parabola to a straight line.
+mostly the curvature of a tyre's curve well below its peak: laws go from a parabola to a straight line. `radius_loss`:
+wheels that carry more roll on less radius, in curves the outer ones. `antenna_height`: a car pitches by 0.01 rad per
+m/s² at the most, 1 m below an antenna on its roof (K).
 """
 
 from __future__ import annotations
@@ -46,6 +48,8 @@ TOLERANCES: tuple[Effect, ...] = (
     _of("cornering_rear", "-", 0.2, _plant(lambda p, x: p._replace(
         cornering_slope=p.cornering_slope * [1.0, 1.0, 1.0 + x, 1.0 + x]))),
     _of("friction", "-", 0.5, _plant(lambda p, x: p._replace(mu=p.mu * (1.0 + x)))),
+    _of("radius_loss", "-", 0.005, _plant(lambda p, x: p._replace(radius_loss=p.radius_loss + x))),
+    _of("antenna_height", "s^2", 0.01, _channel("v_x", lambda c, x: replace(c, pitching=c.pitching + x))),
     _of("steer_offset", "rad", 5e-3, _channel("steer_angle", lambda c, x: replace(c, bias=c.bias + x))),
     _of("steer_gain", "-", 0.03, _channel("steer_angle", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
     _of("gyro_offset", "rad/s", 2e-3, _channel("yaw_rate", lambda c, x: replace(c, bias=c.bias + x))),

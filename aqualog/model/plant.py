@@ -44,6 +44,7 @@ class Plant(NamedTuple):
     r_e: FloatArray
     r_l: FloatArray
     radius_growth: FloatArray
+    radius_loss: FloatArray  # relative, per relative change of the load
     inertia: FloatArray  # [kg·m²] of the rim, and of the belt too if they turn as one
     belt_inertia: FloatArray  # [kg·m²] 0: rim and belt turn as one
     torsion_stiffness: FloatArray
@@ -106,7 +107,9 @@ _OF_TYRES = (
     "h_film", "groove_relief", "h_wave", "h_track", "track_irregularity", "contact_scatter",
 )  # fmt: skip
 _ADDED = ("head_wind", "cornering_drag", "warmup_extra", "towed_mass", "leak_start")
-_ADDED_AT_WHEELS = ("radius_growth", "brake_drag", "slip_slope_drift", "relaxation_length", "leak_radius", "leak_slope")
+_ADDED_AT_WHEELS = (
+    "radius_growth", "radius_loss", "brake_drag", "slip_slope_drift", "relaxation_length", "leak_radius", "leak_slope",
+)  # fmt: skip
 
 
 def build_plant(

@@ -49,7 +49,8 @@ class Channel:
 
     `noise` rms; `resolution` step of the bus signal; `lag_s` first-order low-pass; `latency_s` value sampled at t bears
     the stamp t + latency; `gain_spread`, `offset_spread`, `drift_spread` [1/s]: rms of the random values of a run.
-    `gain`, `bias`, `drift` [1/s] and `delay_s` are set, not random: terms of a model act on them.
+    `gain`, `bias`, `drift` [1/s] and `delay_s` are set, not random: terms of a model act on them. `pitching` [s²]: what
+    the rate of `a_x` adds, as an antenna on the roof of a car that pitches has it for the velocity.
     """
 
     noise: float = 0.0
@@ -63,6 +64,7 @@ class Channel:
     bias: float = 0.0
     drift: float = 0.0
     delay_s: float = 0.0
+    pitching: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,8 +185,12 @@ def _picked_up(truth: Truth, sensors: Sensors, name: str, seen: FloatArray, wind
 
 
 def _rolling(truth: Truth, sensors: Sensors, name: str, seed: int) -> FloatArray:
-    """Return a column of the truth; a wheel speed with the error of its tone ring, in the same phase as with teeth."""
+    """Return a column of the truth at the place of its sensor; a wheel speed with the error of its tone ring, in the
+    same phase as with teeth."""
     x = _column(truth, name)
+    pitching = sensors.channels.get(name, Channel()).pitching
+    if pitching != 0.0:
+        x = x + pitching * np.gradient(_column(truth, "a_x"), _step(truth))
     amplitude = sensors.tone_ring[_OMEGA[name]] if name in _OMEGA else 0.0
     if amplitude == 0.0:
         return x

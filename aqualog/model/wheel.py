@@ -57,6 +57,7 @@ _series_slope = inlined(surface.series_slope)
 _rolling_force = inlined(rolling_resistance_force)
 _aligning_moment = inlined(steering.aligning_moment)
 _effective_radius = inlined(rolling.effective_radius)
+_pressed_radius = inlined(rolling.pressed_radius)
 _load_factor = inlined(rolling.load_factor)
 _carcass_torque = inlined(rolling.carcass_torque)
 _hop = inlined(load.hop)
@@ -223,7 +224,7 @@ def ground_under(i, warm, weight, place, p, q, lanes, fields, track):  # type: i
 @part
 def wheel(i, now, ground, command, m, p, q):  # type: ignore[no-untyped-def]
     """Fill what wheel `i` contributes to derivative, Jacobian and record; return its forces on the body."""
-    roll = _rolling(i, now, m, p, q)
+    roll = _rolling(i, now, ground.F_z, m, p, q)
     wet = _water(roll, ground, p.scatter, q)
     stiff = _stiffness(now, ground, q)
     slips = _slip(i, m, roll, q.relaxation_length)
@@ -256,13 +257,14 @@ def wheel(i, now, ground, command, m, p, q):  # type: ignore[no-untyped-def]
 
 
 @part
-def _rolling(i, now, m, p, q):  # type: ignore[no-untyped-def]
+def _rolling(i, now, F_z, m, p, q):  # type: ignore[no-untyped-def]
     front = i < 2
     x = p.l_f if front else -p.l_r
     side = 0.5 * p.track if i % 2 == 0 else -0.5 * p.track
     angle = now.steer if front else 0.0
     along, across = _wheel_velocity(m.y[V_X], m.y[V_Y], m.y[YAW_RATE], angle, x, side)
     r_e = _effective_radius(q.r_e, along, q.radius_growth) * (1.0 - q.leak_radius * now.leak)
+    r_e *= _pressed_radius(F_z, q.F_z_ref, q.radius_loss)
     omega = m.y[BELT + i] if q.belt_inertia > 0.0 else m.y[OMEGA + i]
     return _Rolling(x, side, omega, along, across, r_e, omega * r_e)
 

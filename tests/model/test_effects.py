@@ -7,10 +7,13 @@ import pytest
 
 from aqualog.config.model import dump_model, load_model
 from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
+from aqualog.model.drawing import slalom_angle
 from aqualog.model.effects import EFFECTS, EMPIRICAL
-from aqualog.model.scenario import Lane, Scenario
+from aqualog.model.scenario import Lane, Scenario, Steering
 from aqualog.model.simulate import assemble, drive_truth, simulate
 from aqualog.model.term import Model, Term
+from aqualog.model.tyre import TYRES
 from tests.thesis.passes import SEDAN
 
 HUMP = ((15.0, 0.0), (20.0, 400.0), (25.0, 0.0))
@@ -133,3 +136,16 @@ def test_no_name_is_taken_twice():
     for effect in EMPIRICAL.values():
         assert set(effect.twins) <= set(EFFECTS)
         assert effect.table is not None
+
+
+def test_a_wheel_that_carries_more_rolls_on_less_radius():
+    """In a slalom the outer wheels turn faster for it; the slips hardly change."""
+    steering = Steering(slalom_angle(SEDAN, TYRES["worn_summer"], 25.0, 3.0), 4.0)
+    setup = assemble(Scenario(SEDAN, duration_s=6.0, speed=((0.0, 25.0), (6.0, 25.0)), steering=steering))
+    pressed = setup._replace(plant=setup.plant._replace(radius_loss=np.full(4, 0.02)))
+    base, with_it = (drive_truth(s).columns for s in (setup, pressed))
+    for i, w in enumerate(WHEELS):
+        expected = -0.02 * (base[f"true_load_{w}"] / setup.plant.F_z_ref[i] - 1.0)
+        assert np.ptp(expected) > 0.004
+        shown = base[f"omega_{w}"] / with_it[f"omega_{w}"] - 1.0
+        assert shown == pytest.approx(expected, abs=0.1 * np.ptp(expected)), w
