@@ -186,7 +186,7 @@ _PAIR = ("a_x", "a_y")
 # relations (D): an offset b of the accelerometer is a slope b / g and a force -m b against the motion, but for its slip
 _LIKE_AN_OFFSET = (("road_grade", "rolling_resistance"), ("road_grade", "brake_drag"))
 # Tolerances are given where a vehicle file or a simulator errs by more than a third of the smallest size: slip slopes
-# change by 5 % with a few degrees, the driveline turns with the wheels, half a sample lies between two buses, scrub and
+# change by 5 % with a few degrees, the driveline turns with the wheels, a filter and half a sample, 10 ms, lie between two buses, scrub and
 # crowned roads differ, tyres follow their load by other laws, warm up and grow a little on every drive (K). Tyres of
 # one size differ by 1 % in radius, wheels by a third in inertia, slopes of the slip from 25 to 40 (K). Every tyre
 # builds up its forces over some decimetres.
@@ -324,7 +324,7 @@ _ALL = [
         "signal_delay", "delay of a signal [s]", "The signal comes {delay:.3f} s late.", "GNSS up to 0.5 s (V)",
         (Parameter("delay", "s", 0.0, 0.1, -1.0, 2.0, 0.01, "late positive"),),
         _on_channels(lambda c, v: replace(c, delay_s=c.delay_s + v["delay"])), _SIGNALS, "v_x", twins=("clock_skew",),
-        drive=DriveSearch(places=("v_x", "a_x", "omega", "torque"), tolerance=0.005, is_shift=True, is_relative=True),
+        drive=DriveSearch(places=("v_x", "a_x", "omega", "torque"), tolerance=0.01, is_shift=True, is_relative=True),
     ),
     Effect(
         "tone_ring", "wheel-speed pick-up [-]", "The tone ring of the wheel is uneven by {amplitude:.2%}.",
