@@ -74,7 +74,9 @@ def channel_title(channel: str) -> str:
 
 
 def effect_title(key: str) -> str:
-    """`tyre_radius@fl` -> `tyre radius, FL`; a signal keeps its name."""
+    """`tyre_radius@fl` -> `tyre radius, FL`; a signal keeps its name. Of several keys each is named."""
+    if " + " in key:
+        return " with ".join(map(effect_title, key.split(" + ")))
     effect, _, where = key.partition("@")
     place = where.upper() if where in _WHEELS else _PLACES.get(where, where)
     if effect in _OF_BUSES:
