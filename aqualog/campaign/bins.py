@@ -196,7 +196,7 @@ def cells(
                 left_out[why] += int(np.count_nonzero(left & which))
                 left &= ~which
             whole = left & np.all([np.isfinite(x) for x in found.columns.values()], axis=0)
-            left_out["a signal is missing"] += int(np.count_nonzero(left & ~whole))
+            left_out["signals missing"] += int(np.count_nonzero(left & ~whole))
             index = np.flatnonzero(whole)
             if index.size:
                 step = index + number * _APART

@@ -39,7 +39,6 @@ MAP_KEYS = (
 """Every key of a signal map."""
 
 _LONGEST = 60  # characters of a name that are shown
-"""Channels without a signal that a map names at its end, at most."""
 
 _TABLES = ("signals", "time", "csv", "sources")
 _ENTRY_KEYS = tuple(k.name.removeprefix("SIGNAL.") for k in MAP_KEYS if k.table == "signals")

@@ -91,7 +91,7 @@ def test_a_remark_on_many_logs_keeps_its_numbers(case):
     notes = [f"log_{k}.csv: gain {g} (95 % {g - 2} to {g + 0.1:.2f}) at 90 km/h" for k, g in enumerate(gains)]
     done = [replace(r, about={**r.about, "notes": [n]}) for r, n in zip(case.done, notes, strict=False)]
     (found,) = (p for p in problems_of(SimpleNamespace(runs=done, done=done), ("tyre",)) if "gain" in p.title)
-    assert found.title == "log_….csv: gain 0.81 to 1.24 (95 % -1.19 to -0.76 to 0.91 to 1.34) at 90 km/h"
+    assert found.title == "log_….csv: gain 0.81 … 1.24 (95 % -1.19 … -0.76 to 0.91 … 1.34) at 90 km/h"
     assert [text for _, text in found.runs] == notes
 
 

@@ -193,7 +193,7 @@ def test_confused_sets_are_told_once_and_exact_relations_apart():
 
 def test_the_clock_of_a_bus_is_named_by_no_single_wheel():
     assert effect_title("clock_skew@torque_fl") == "clock skew, wheel torque"
-    assert effect_title("tyre_radius@fl") == "tyre radius, FL"
+    assert effect_title("road_grade + tyre_radius@fl") == "road grade with tyre radius, FL"
 
 
 def test_effects_that_look_alike_are_one_line_for_all():
