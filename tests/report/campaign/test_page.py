@@ -70,7 +70,7 @@ def test_notes_that_differ_in_numbers_are_one_kind(case):
     many = SimpleNamespace(runs=done, done=done)
     notes = [p for p in problems_of(many, ("tyre",)) if p.weight == "note"]
     last = done[-1].index
-    assert notes[0].title == f"0 to {3 * last} samples dropped at 0.5 to {last}.5 s"
+    assert notes[0].title == f"0 … {3 * last} samples dropped at 0.5 … {last}.5 s"
     assert notes[0].runs[1] == (1, "3 samples dropped at 1.5 s")
     wild = [replace(done[0], index=i, about={**done[0].about, "notes": [f"{chr(256 + i)}"]}) for i in range(500)]
     kinds = problems_of(SimpleNamespace(runs=wild, done=wild), ("tyre",))
