@@ -170,6 +170,8 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
     found: dict[str, tuple[Entry, ChannelInfo]] = {}
     faults: list[str] = []
     doubled = 0
+    if not channels:  # the reader knows why: one reason, not a fault for each line of the map
+        return {}
     for symbol, entry in signal_map.entries.items():
         matches = next((m for m in (matching(channels, c) for c in entry.channel) if m), [])
         if len(matches) == 1:
@@ -264,4 +266,4 @@ def _nearest(wanted: Sequence[str], channels: Sequence[ChannelInfo]) -> str:
     if near:
         return f' (nearest: "{near[0]}")'
     files = listed(list(dict.fromkeys(c.file for c in channels)), 3)
-    return f" in {files}, which {'has' if len(channels) else 'has no'} {listed(names, 6) if names else 'channel'}"
+    return f" in {files}, which has {listed(names, 6)}"

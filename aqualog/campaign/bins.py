@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.campaign.definition import Campaign, Run, group_keys
+from aqualog.campaign.matrix import campaign_matrix
 from aqualog.campaign.measure import REASONS
 from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.core.errors import ConfigError
@@ -19,13 +20,12 @@ from aqualog.core.notation import SIDES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = [
-    "DEFAULT_KEYS", "DEPTH_KEYS", "KMH", "NO_DRIVETRAIN", "ROADS", "Cell", "Group", "Picked", "Plan", "Pool", "cells",
+    "DEPTH_KEYS", "KMH", "NO_DRIVETRAIN", "ROADS", "Cell", "Group", "Picked", "Plan", "Pool", "cells",
     "check_plan", "driven_of", "free_of", "group_of", "plan", "pooled", "road_of",
 ]  # fmt: skip
 
 KMH = 1.0 / 3.6  # [m/s]
 ROADS = ("wet", "dry", "both")
-DEFAULT_KEYS = ("tyre", "pressure_rear_bar", "water_depth_mm", "load_front_kg", "load_rear_kg")
 DEPTH_KEYS = ("water_depth_mm", "water_depth_left_mm")
 SIDE = "side"
 NO_DRIVETRAIN = "the vehicle file does not say which axle is driven"
@@ -95,7 +95,7 @@ class Cell:
 def check_plan(campaign: Campaign, by: Sequence[str], *, width_kmh: float = 10.0, road: str = "wet") -> Plan:
     """Check the value of --by before any log is read.
 
-    Without any name: the keys of `DEFAULT_KEYS` in which the runs differ. Different cars are never put together.
+    Without any name: the factors of the test matrix. Different cars are never put together.
 
     Raises
     ------
@@ -109,8 +109,8 @@ def check_plan(campaign: Campaign, by: Sequence[str], *, width_kmh: float = 10.0
     names = [n for n in by if n != SIDE]
     keys = group_keys(names, campaign.keys) if names else ()
     if not by:
-        keys = tuple(k for k in DEFAULT_KEYS if _differs(campaign.runs, k))
-    if "vehicle" not in keys and _differs(campaign.runs, "vehicle"):
+        keys = tuple(f.key for f in campaign_matrix(campaign).factors)
+    if "vehicle" not in keys and len({r.vehicle.stem for r in campaign.runs}) > 1:
         keys = ("vehicle", *keys)
     return Plan(keys, SIDE in by, width_kmh, road)
 
@@ -118,10 +118,6 @@ def check_plan(campaign: Campaign, by: Sequence[str], *, width_kmh: float = 10.0
 def plan(data: CampaignData, by: Sequence[str], *, width_kmh: float = 10.0, road: str = "wet") -> Plan:
     """`check_plan` of a campaign with results."""
     return check_plan(data.configured.campaign, by, width_kmh=width_kmh, road=road)
-
-
-def _differs(runs: Sequence[Run], key: str) -> bool:
-    return len({_value(r, key) for r in runs}) > 1
 
 
 def _value(run: Run, key: str) -> float | str | None:
@@ -200,7 +196,7 @@ def cells(
                 left_out[why] += int(np.count_nonzero(left & which))
                 left &= ~which
             whole = left & np.all([np.isfinite(x) for x in found.columns.values()], axis=0)
-            left_out["a signal is missing"] += int(np.count_nonzero(left & ~whole))
+            left_out["signals missing"] += int(np.count_nonzero(left & ~whole))
             index = np.flatnonzero(whole)
             if index.size:
                 step = index + number * _APART

@@ -45,7 +45,7 @@ def _resistance(windows: Windows) -> Iterator[Doubt]:
         return
     what = f"the resistance measure lies at {np.median(x):+.2f} m/s² in the middle of this drive"
     cause = "mass, wheel torque (gear ratio, sign, unit) and the offset of a_x"
-    advice = f"check {cause} before you believe the resistance detector"
+    advice = f"unless most of it was on water, check {cause} before you believe the resistance detector"
     yield Doubt("resistance", ("a_x",), what, advice, value=float(np.median(x)))
 
 

@@ -39,8 +39,6 @@ MAP_KEYS = (
 """Every key of a signal map."""
 
 _LONGEST = 60  # characters of a name that are shown
-MOST_UNMAPPED = 60
-"""Channels without a signal that a map names at its end, at most."""
 
 _TABLES = ("signals", "time", "csv", "sources")
 _ENTRY_KEYS = tuple(k.name.removeprefix("SIGNAL.") for k in MAP_KEYS if k.table == "signals")
@@ -200,8 +198,7 @@ def map_text(
             lines += [f"drift_ppm = {clock.drift_ppm!r}", f"at_s = {clock.at_s!r}"]
     if unmapped:
         lines += ["", f"# not mapped, {len(unmapped)} channels:"]
-        lines += [f"#   {_one_line(name)}" for name in unmapped[:MOST_UNMAPPED]]
-        lines += [f"#   and {len(unmapped) - MOST_UNMAPPED} more"] if len(unmapped) > MOST_UNMAPPED else []
+        lines += [f"#   {_one_line(name)}" for name in unmapped]
     return "\n".join(lines) + "\n"
 
 

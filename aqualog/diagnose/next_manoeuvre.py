@@ -16,7 +16,7 @@ from aqualog.diagnose.noise import Noise
 from aqualog.diagnose.outcome import Rival
 from aqualog.diagnose.records import SURE, Manoeuvre
 from aqualog.diagnose.run_information import Case, Forecast, entropy, forecast, of_check, of_log, of_run
-from aqualog.diagnose.words import listed, name_of
+from aqualog.diagnose.words import name_of
 from aqualog.model.term import Check, Model
 
 __all__ = ["next_manoeuvre"]
@@ -137,7 +137,7 @@ def _recommended(case: Case, o: _Option, before: float, *, enough: bool) -> Mano
     how = f"{o.what.how}{OFTEN[o.times]} ({o.minutes:.0f} min)"
     if not enough:
         text = (
-            f"No run, check or further sensor distinguishes {_told(members, pairs)}. The best is "
+            f"No run, check or further sensor distinguishes: {_told(members, pairs)}. The best is "
             f"{o.what.name.replace('_', ' ')}{OFTEN[o.times]}: {rises}."
         )
         return Manoeuvre("none", (), text, np.nan, np.nan, 0.0, before, after)
@@ -146,7 +146,7 @@ def _recommended(case: Case, o: _Option, before: float, *, enough: bool) -> Mano
         text = f"With these signals no run helps. Add {o.sensor.name} to the log. {text}"
     rest = [q for q in pairs if q not in decided]
     if rest:
-        text += f" It does not distinguish {_told(members, rest)} for certain."
+        text += f" It does not distinguish for certain: {_told(members, rest)}."
     keys = tuple(dict.fromkeys((_keys(a), _keys(b)) for a, b in (_apart(members, q) for q in decided)))
     name = o.what.name if o.sensor is None else "sensor"
     return Manoeuvre(name, keys, text, np.nan, np.nan, o.minutes, before, after)
@@ -167,11 +167,10 @@ def _keys(members: Sequence[Hypothesis]) -> str:
 
 
 def _told(members: Sequence[Sequence[Hypothesis]], pairs: Sequence[tuple[int, int]]) -> str:
-    sides = [_apart(members, q) for q in pairs]
-    words = [
-        " from ".join(listed([name_of(h.effect.name, h.where) for h in s]) if s else "nothing more" for s in both)
+    sides = [sorted(_apart(members, q), key=len, reverse=True) for q in pairs]
+    words = list(dict.fromkeys(
+        " from ".join(" with ".join(name_of(h.effect.name, h.where) for h in s) or "its absence" for s in both)
         for both in sides
-    ]
-    words = list(dict.fromkeys(words))
+    ))  # fmt: skip
     more = len(words) - MENTIONED
-    return listed(words if more <= 0 else [*words[:MENTIONED], f"{more} more"])
+    return "; ".join(words if more <= 0 else [*words[:MENTIONED], f"{more} more"])

@@ -151,7 +151,7 @@ class Diagnosis(Result):
         from aqualog.report.page import report_page
 
         drives = self.found.drives
-        title = ", ".join([self.vehicle_name, *drives[:3]]) + (" …" if len(drives) > 3 else "")
+        title = ", ".join(dict.fromkeys([self.vehicle_name, *drives[:3]])) + (" …" if len(drives) > 3 else "")
         return {
             "diagnosis.json": self._json_file(),
             "model.toml": text_file(lambda: _model_text(self.found, self.vehicle_name)),

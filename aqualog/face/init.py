@@ -246,8 +246,9 @@ def init(
     check_one_drive([(o.file, o.path) for o in contents.overviews], contents.proposals.values())
     proposals, facts = dict(contents.proposals), _radii(contents)
     if not proposals:
+        told = next((f" ({n})" for n in contents.notes if "CAN frames" in n), "")
         raise SignalError(
-            f"none of {len(contents.overviews)} channels looks like a signal", where=one.title,
+            f"none of {len(contents.overviews)} channels looks like a signal{told}", where=one.title,
             expected="speeds, accelerations, torques", hint="`aqualog inspect LOG` lists what is in it; --dbc for CAN",
         )  # fmt: skip
     answers: list[tuple[Question, str]] = []

@@ -12,7 +12,7 @@ from aqualog.doctor.findings import Examination, Finding, Picture
 from aqualog.report.figures import axis, figure, line
 from aqualog.report.sections import Cell, Figures, Headline, Lines, Para, Report, Section, Table
 from aqualog.report.theme import FULL_SHADE, INK, THRESHOLD
-from aqualog.report.values import CELL, NOTE, counted, cut, plot_text, pretty_unit, upper_first
+from aqualog.report.values import CELL, NOTE, counted, cut, plot_text, pretty_unit
 from aqualog.report.wording import detector_name, not_judged
 
 __all__ = ["examination_document", "examination_report"]
@@ -87,7 +87,7 @@ def _page(found: Examination, lacks: list[tuple[str, tuple[str, ...]]], figures:
     )
     rows: list[list[str | Cell]] = [
         [Cell(_LEVELS[f.level][0], tag=_LEVELS[f.level][1]), cut(f.file, CELL) or "–", cut(f.channel, CELL) or "–",
-         upper_first(cut(f.what, NOTE)), cut(f.advice, NOTE) or "–"]
+         cut(f.what, NOTE), cut(f.advice, NOTE) or "–"]
         for f in ordered
     ]  # fmt: skip
     files: list[list[str | Cell]] = [

@@ -16,7 +16,8 @@ def input_sections(checks: Sequence[Remark]) -> list[Section]:
         return []
     short = dict.fromkeys(f"{', '.join(r.signals[:3])} ({r.kind})" for r in checks)
     brief: list[Line] = [f"{'; '.join(short)}: the notes say what to change"]
-    lines: list[Line] = [(", ".join(r.signals), f"{r.what}\n{r.advice}") for r in checks]
+    heads = [", ".join(r.signals) for r in checks]
+    lines: list[Line] = [(h, f"{r.what.removeprefix(f'{h} ')}\n{r.advice}") for h, r in zip(heads, checks, strict=True)]
     items = [Lines(brief, where="text"), Lines(lines, most=1000, where="page")]
     return [Section("Check the inputs first", items, "inputs", look="problems")]
 

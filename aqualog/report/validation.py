@@ -180,7 +180,7 @@ def _why(d: Mapping[str, Any]) -> list[Section]:
     why = d["diagnosis"]
     if why is None:
         return [Section("Why", [
-            Lines(["Not asked: --no-why leaves the diagnosis out."]),
+            Lines(["Not asked: --no-why leaves the diagnosis out. This asks, with the same --signals and --dbc:"]),
             Code(f"aqualog diagnose {' '.join(d['logs'][:3])} --vehicle CAR.toml"),
         ], "why-section", where="page")]  # fmt: skip
     causes = [c["sentence"] for c in why["causes"]]

@@ -36,6 +36,7 @@ def _over_time(judged: Judged, found: Validity) -> dict[str, Any]:
     measured = np.where(trace.judged, trace.measured[plot.y], np.nan)[here]
     edge = boundary(t, shown, plot.tolerance)
     title = f"{plot.y}: {SIGNALS[plot.y].title}" + (f", {trace.name}" if len(found.traces) > 1 else "")
+    title += ", five minutes about the worst" if t.size < trace.judged.size else ""
     return _drawn(title, edge, (t, shown), (t, measured), plot.y, "t")
 
 

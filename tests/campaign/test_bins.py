@@ -202,6 +202,16 @@ def test_plan_refuses_what_makes_no_sense(worn):
     assert check_plan(campaign, []).keys == ()
 
 
+def test_without_keys_runs_that_differ_are_not_pooled():
+    def keys(*more):
+        values = [{"wear": w, **dict.fromkeys(more, w), "water_depth_mm": d} for w in "ab" for d in (0.0, 1.3)]
+        runs = tuple(Run((Path("a.mf4"),), Path("car.toml"), None, None, v) for v in values)
+        return check_plan(Campaign("c", Path("c.toml"), None, runs), []).keys
+
+    assert keys() == ("wear", "water_depth_mm")
+    assert keys("tyre") == ("tyre", "water_depth_mm")  # the wear follows the tyre
+
+
 def test_resistance_is_less_each_runs_own_dry_level(worn):
     rows = [r for r in resistances(worn, plan(worn, ["tyre"])).rows if r.runs >= 5]
     assert rows

@@ -118,7 +118,7 @@ def test_text_and_page_name_the_inputs_before_the_numbers(folder, command, after
     page = next(out.glob("*.html")).read_text(encoding="utf-8")
     body = page[page.index("<main") if "<main" in page else 0 :]
     assert body.index("Check the inputs first") < body.index(after)
-    assert body.count("a_y has the opposite sign of") == 1
+    assert body.count("<b>a_y</b> has the opposite sign of") == 1
 
 
 def test_align_takes_a_map_with_the_clocks_of_other_files(folder, tmp_path):

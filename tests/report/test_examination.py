@@ -52,7 +52,7 @@ def test_page_begins_with_the_gravest_finding_and_marks_it(found):
     page = report_page(examination_report(found), title="drive")
     words = re.sub(r"<[^>]+>|\s+", " ", page[page.index("<h1>") : page.index("<footer>")])
     assert "4 findings: 1 lost, 2 worth checking, 1 mended" in words
-    assert words.index("100 of 10000 samples") < words.index("Stands at 50") < words.index("2 overflows")
+    assert words.index("100 of 10000 samples") < words.index("stands at 50") < words.index("2 overflows")
     assert words.index("2 overflows") < words.index("Detectors")
     figures = json.loads(re.search(r'id="figure-data">(.*?)</script>', page, re.DOTALL)[1])
     shapes = figures["picture-1"]["layout"]["shapes"]

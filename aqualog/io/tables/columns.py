@@ -76,7 +76,6 @@ _STEMS = (
     "utc", "uhrzeit", "time of day",
 )  # fmt: skip
 _SUFFIX = re.compile(r"^(?P<stem>.*?)[ _]?(?P<unit>seconds|secs|sec|s|ms|msec|us|µs|usec|ns|nsec|min)$")
-_DATES = ("date", "datum", "utc date", "gps date", "day")
 _NAME = '[time] channel = "{}" in the map'
 _HINT = _NAME.format("...")
 

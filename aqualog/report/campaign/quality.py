@@ -176,17 +176,17 @@ def _notes(data: CampaignData) -> list[Problem]:
 
 
 def _with_ranges(notes: Sequence[str]) -> str:
-    """The sentence of notes that differ in numbers alone, with the range of each number: `0.8 to 1.2`.
+    """The sentence of notes that differ in numbers alone, with the range of each number: `0.8 … 1.2`.
 
     Numbers that are part of a name have none: `log…`.
     """
     columns = zip(*(_NUMBER.findall(n) for n in notes), strict=True)
-    ranges = iter([" to ".join(dict.fromkeys((min(c, key=_value), max(c, key=_value)))) for c in columns])
+    ranges = iter([" … ".join(dict.fromkeys((min(c, key=_value), max(c, key=_value)))) for c in columns])
 
     def shown(found: re.Match[str]) -> str:
         text = next(ranges)
         is_name = found.start() > 0 and (notes[0][found.start() - 1].isalpha() or notes[0][found.start() - 1] == "_")
-        return "…" if is_name and " to " in text else text
+        return "…" if is_name and " … " in text else text
 
     return _NUMBER.sub(shown, notes[0])
 

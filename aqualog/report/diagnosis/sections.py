@@ -118,7 +118,7 @@ def _on_gain(said: Mapping[str, list[str]], figures: Mapping[str, Any]) -> list[
         Section("Gain of the extended model", [
             Lines(gain, "gain", 12, len(said["score"]) + _MOST_CHANNELS),
             Beside([
-                Section("For the detectors", [Lines(said["consequences"], "consequences")]),
+                Section("For the detectors, on simulated drives", [Lines(said["consequences"], "consequences")]),
                 Section("", [Figures([x for x in ("gain-bars",) if x in figures])]),
             ]),
         ], "gain-section", hint),

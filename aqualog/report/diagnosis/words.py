@@ -7,12 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any
 
 from aqualog.diagnose.shapes import MECHANISMS
-from aqualog.report.values import interval_text, measured, percent, pretty_unit, short, upper_first
+from aqualog.report.values import interval_text, percent, pretty_unit, short, upper_first
 from aqualog.report.wording import detector_name
 
 __all__ = [
     "COORDINATES", "by_change", "by_sharpness", "chance", "channel_title", "coordinate_title", "effect_title",
-    "limit_sentences", "mechanism_title", "sentences", "untested_by_reason", "verdict_title",
+    "mechanism_title", "sentences", "untested_by_reason", "verdict_title",
 ]  # fmt: skip
 
 WORSE = 0.01  # rise of a channel's error that is reported
@@ -74,7 +74,9 @@ def channel_title(channel: str) -> str:
 
 
 def effect_title(key: str) -> str:
-    """`tyre_radius@fl` -> `tyre radius, FL`; a signal keeps its name."""
+    """`tyre_radius@fl` -> `tyre radius, FL`; a signal keeps its name. Of several keys each is named."""
+    if " + " in key:
+        return " with ".join(map(effect_title, key.split(" + ")))
     effect, _, where = key.partition("@")
     place = where.upper() if where in _WHEELS else _PLACES.get(where, where)
     if effect in _OF_BUSES:
@@ -143,12 +145,6 @@ def by_sharpness(document: Mapping[str, Any]) -> tuple[list[Mapping[str, Any]], 
     chosen = sorted(first.values(), key=sharpness)
     keys = {x["key"] for x in chosen}
     return chosen, [x for x in ordered if x["key"] not in keys]
-
-
-def limit_sentences(document: Mapping[str, Any]) -> list[str]:
-    """`payload mass from 14 kg`, one of each effect."""
-    told = [x for x in by_sharpness(document)[0] if x["size"] is not None]
-    return [f"{effect_title(x['key'])} from {measured(x['size'], x['unit'])}" for x in told]
 
 
 def _test(s: Mapping[str, Any] | None) -> list[str]:

@@ -74,8 +74,8 @@ def route_figure(result: DriveResult, tables: Mapping[str, Sequence[Episode]]) -
     data = [
         *_marks(tables, east, north, result.signals.dt),
         _drive(result, east, north, shown),
-        _end("start", "circle-open", east[shown[0]], north[shown[0]]),
-        _end("end", "x", east[shown[-1]], north[shown[-1]]),
+        _end("start", "circle-open", east[shown[0]], north[shown[0]], "top center"),
+        _end("end", "x", east[shown[-1]], north[shown[-1]], "bottom center"),
     ]
     return figure(
         data, "", axis("east [m]"), axis("north [m]", scaleanchor="x", scaleratio=1), height=480, showlegend=True,
@@ -141,8 +141,8 @@ def _marks(
     return found
 
 
-def _end(name: str, symbol: str, x: float, y: float) -> dict[str, Any]:
+def _end(name: str, symbol: str, x: float, y: float, place: str) -> dict[str, Any]:
     return dots(
         name, [x], [y], INK, size=12, style={"symbol": symbol}, mode="markers+text", text=[name], showlegend=False,
-        textposition="top center",
+        textposition=place,
     )  # fmt: skip

@@ -203,7 +203,7 @@ function drawPanel(id, curves, limits, unit, yTitle, level) {
   const beyond = leftOut(curves, limits.y);
   if (beyond) {
     lay.margin.t = 24;
-    lay.annotations = [...(lay.annotations || []), { text: beyond, xref: "paper", yref: "paper", x: 1, y: 1, xanchor: "right",
+    lay.annotations = [...(lay.annotations || []), { text: beyond, xref: "paper", yref: "paper", x: 0, y: 1, xanchor: "left",
       yanchor: "bottom", showarrow: false, font: { size: 11, color: "@muted" } }];
   }
   const names = new Set();

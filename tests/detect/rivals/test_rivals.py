@@ -37,10 +37,6 @@ def soft_road(car=RWD, soft=6.0, **kw):
     return straight(replace(car, given=KNOWN), slope=slope, **kw), replace(car, given=KNOWN)
 
 
-def active_s(result, name):
-    return {(t.wheel, t.side): t.active for t in result.tracks if t.detector == name}
-
-
 def is_on(result, name):
     return np.any([t.active for t in result.tracks if t.detector == name], axis=0)
 

@@ -17,7 +17,7 @@ from asammdf.blocks import mdf_v4
 from asammdf.blocks.conversion_utils import from_dict
 
 from aqualog.align.load import load_signals
-from aqualog.align.mapping import SignalMap
+from aqualog.align.mapping import Entry, SignalMap
 from aqualog.core.errors import LogError, SignalError
 from aqualog.core.records import Channel, FileFaults
 from aqualog.core.vehicle import Vehicle
@@ -458,9 +458,10 @@ def test_without_a_dbc_the_frames_are_announced(tmp_path: Path, dbc: Path):
     channels, faults = read_all(tmp_path / "a.mf4")
     assert not channels
     assert faults.notes == ("holds 200 raw CAN frames with 1 ids on bus 0; give --dbc FILE to decode them",)
-    with pytest.raises(SignalError, match=r"holds no channel .*200 raw CAN frames") as caught:
-        load_signals([tmp_path / "a.mf4"], vehicle=Vehicle(), signal_map=SignalMap())
-    assert caught.value.hint.startswith("--dbc FILE")
+    for entries in ({}, {"v_x": Entry("v_x", ("ESP_19.Speed_FL",))}):
+        with pytest.raises(SignalError, match=r"holds no channel .*200 raw CAN frames") as caught:
+            load_signals([tmp_path / "a.mf4"], vehicle=Vehicle(), signal_map=SignalMap(entries))
+        assert caught.value.hint.startswith("--dbc FILE")
 
 
 def test_bus_stands_in_front_only_where_needed(tmp_path: Path, dbc: Path):

@@ -70,7 +70,7 @@ def test_notes_that_differ_in_numbers_are_one_kind(case):
     many = SimpleNamespace(runs=done, done=done)
     notes = [p for p in problems_of(many, ("tyre",)) if p.weight == "note"]
     last = done[-1].index
-    assert notes[0].title == f"0 to {3 * last} samples dropped at 0.5 to {last}.5 s"
+    assert notes[0].title == f"0 … {3 * last} samples dropped at 0.5 … {last}.5 s"
     assert notes[0].runs[1] == (1, "3 samples dropped at 1.5 s")
     wild = [replace(done[0], index=i, about={**done[0].about, "notes": [f"{chr(256 + i)}"]}) for i in range(500)]
     kinds = problems_of(SimpleNamespace(runs=wild, done=wild), ("tyre",))
@@ -91,7 +91,7 @@ def test_a_remark_on_many_logs_keeps_its_numbers(case):
     notes = [f"log_{k}.csv: gain {g} (95 % {g - 2} to {g + 0.1:.2f}) at 90 km/h" for k, g in enumerate(gains)]
     done = [replace(r, about={**r.about, "notes": [n]}) for r, n in zip(case.done, notes, strict=False)]
     (found,) = (p for p in problems_of(SimpleNamespace(runs=done, done=done), ("tyre",)) if "gain" in p.title)
-    assert found.title == "log_….csv: gain 0.81 to 1.24 (95 % -1.19 to -0.76 to 0.91 to 1.34) at 90 km/h"
+    assert found.title == "log_….csv: gain 0.81 … 1.24 (95 % -1.19 … -0.76 to 0.91 … 1.34) at 90 km/h"
     assert [text for _, text in found.runs] == notes
 
 

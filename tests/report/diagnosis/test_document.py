@@ -11,7 +11,7 @@ import pytest
 from aqualog.diagnose.records import Estimate
 from aqualog.report.diagnosis.document import diagnosis_document
 from aqualog.report.diagnosis.sections import diagnosis_report
-from aqualog.report.diagnosis.words import effect_title, limit_sentences, sentences
+from aqualog.report.diagnosis.words import effect_title, sentences
 from aqualog.report.text import report_text
 from aqualog.report.values import interval_text, measured, ordinary, percent, short
 from tests.report.diagnosis_case import BASE, HOSTILE, IMAGE, MASS, NAN, RADIUS, cases, numbers_in, remainder
@@ -59,7 +59,7 @@ def figures_in(text, document):
 def unfounded(document):
     """Numbers of sentences that no figure of the document bears out; how to drive is an instruction and no finding."""
     known = numbers_in(document)
-    said = [s for lines in sentences(document).values() for s in lines] + limit_sentences(document)
+    said = [s for lines in sentences(document).values() for s in lines]
     if document["next_manoeuvre"] is not None:
         said.remove(document["next_manoeuvre"]["sentence"])
     said += [" … ".join(interval_text(p)) for c in document["causes"] for p in c["parameters"].values()]
@@ -193,7 +193,7 @@ def test_confused_sets_are_told_once_and_exact_relations_apart():
 
 def test_the_clock_of_a_bus_is_named_by_no_single_wheel():
     assert effect_title("clock_skew@torque_fl") == "clock skew, wheel torque"
-    assert effect_title("tyre_radius@fl") == "tyre radius, FL"
+    assert effect_title("road_grade + tyre_radius@fl") == "road grade with tyre radius, FL"
 
 
 def test_effects_that_look_alike_are_one_line_for_all():
