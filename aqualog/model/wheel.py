@@ -283,7 +283,7 @@ def water_at(film, F_z, v_even, along, rim, mu, q):  # type: ignore[no-untyped-d
     `v_even` [m/s]: full aquaplaning of a rolling wheel here; speeds [m/s] of the wheel's centre and of its rim.
     """
     # a wheel that has slowed down floats down to a lower speed: Horne's spin-up speed
-    rolling_share = min(max(rim / max(abs(along), 0.5), 0.0), 1.0)
+    rolling_share = min(max((rim if along > 0.0 else -rim) / max(abs(along), 0.5), 0.0), 1.0)
     v_full = v_even * (_SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * rolling_share)
     lost = _lost_contact(along, v_full, q.contact_exponent) * q.contact_gain
     L = 1.0 - min(max(lost, 0.0), 1.0)

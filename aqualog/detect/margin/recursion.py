@@ -225,14 +225,15 @@ def _predict(p, t, m):  # type: ignore[no-untyped-def]
 
 @part
 def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
-    """Fill what is put out."""
+    """Fill what is put out; distances are from the car's own speed, contact from where the tables begin."""
+    contact_at, v = max(v, p.v_least), abs(v)
     m.out[0] = wet
     near, total, q, L = 0.0, 0.0, 0, 0.0
     edge = _LOG[0] - 0.5 * LOG_STEP
     limit = math.log(v + p.near)
     for i in range(_NV):
         near += w[i] * min(max((limit - edge) / LOG_STEP, 0.0), 1.0)
-        n, a = _place(v, i)
+        n, a = _place(contact_at, i)
         L += w[i] * ((1.0 - a) * t.contact[n] + a * t.contact[n + 1])
         while q < 5 and total + w[i] >= _QUANTILES[q] and w[i] > 0.0:
             m.out[2 + q] = math.exp(edge + LOG_STEP * (_QUANTILES[q] - total) / w[i]) - v
@@ -278,7 +279,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
             gain = (1.0 - wet) * g[6] / (g[6] + p.noise_M**2)
             g[5] += gain * own[i]
             g[6] *= 1.0 - gain
-    _fill(p, t, m, speed, w, wet)
+    _fill(p, t, m, v, w, wet)
 
 
 @compiled
