@@ -123,7 +123,7 @@ def _counts(track: Track, scene: Scene) -> BoolArray:
     """Flag samples without a braking force on the statistic's wheel.
 
     Of a variance 0.7 must belong to one axle. A wheel that spins up must have lost its traction, as the single detector
-    asks (C27): on a dry road the engine spins it up with all of it, and so it does in a car that spins round.
+    asks (C27), and not in a car that spins round: on a dry road the engine spins it up with all of it.
     """
     bits = ~scene.braking[track.wheel] if track.wheel is not None else np.ones(scene.size, dtype=bool)
     if track.detector == MINOR_SPIN_DOWN.name:

@@ -34,8 +34,8 @@ from aqualog.features.stream import Features
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
-    "HELD_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SPIN_UP", "SpinParams", "SpinState", "SpinWatch",
-    "has_lost_traction", "initial_state", "scan", "wheel_evidence",
+    "HELD_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SPIN_UP", "SpinParams", "SpinState",
+    "SpinWatch", "has_lost_traction", "initial_state", "scan", "wheel_evidence",
 ]  # fmt: skip
 
 THRESHOLD = 0.6  # [m/s]
@@ -185,9 +185,9 @@ class SpinWatch:
 
 
 def has_lost_traction(f: Features, wheel: str) -> BoolArray:
-    """Where a spin-up of a driven wheel may be water's: little traction, where that is known (C27), and no spinning car.
+    """Where a spin-up of a driven wheel may be water's (n,): little traction, where known (C27), and no spinning car.
 
-    (n,) A car that spins round drifts: a_y - v_x yaw_rate, the rate of its lateral velocity, is large.
+    A car that spins round drifts: a_y - v_x yaw_rate, the rate of its lateral velocity, is large.
     """
     mu = traction(f, wheel)
     with np.errstate(invalid="ignore"):

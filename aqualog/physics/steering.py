@@ -118,8 +118,9 @@ def kingpin_moment(
 
     A rolling or driven wheel turns on bearings: its longitudinal force acts at the wheel centre, with the hub offset as
     its lever, and backward forces turn it outward. Under braking the lever is the scrub radius,
-    hub_offset - r_l sin(inclination). The load's lever is scrub radius times caster plus caster trail times inclination.
-    A load that the wedge carries ahead of the centre is a moment about the wheel's axis. The bearings do not pass it on: it slows the wheel down and comes back as longitudinal force. Small angles; no
+    hub_offset - r_l sin(inclination). The load acts about both leans of the kingpin: scrub radius times sin(caster) and
+    caster trail times sin(inclination). A load that the wedge carries ahead of the centre is a moment about the wheel's
+    axis. The bearings do not pass it on: it slows the wheel down and comes back as longitudinal force. Small angles; no
     steer angle, no inertia of the wheel about the kingpin, no friction, no toe.
 
     Thesis [fichtinger2024]: section 2.4 measures what comes of it (C61-C63); geometry K.

@@ -63,7 +63,9 @@ def test_a_car_that_spins_round_has_no_spin_up(yaw_rate, begins):
     bare = tuple(replace(x.track, active=one < 0) for x in found)
     more = {"delta_a_x": one, "criterion_full": one}
     shared = {MEASURE: one, GATE: one > 0, GATE_AFTER: one, MAY_BE_WATER: one > 0}
-    output = JOINT_CUSUM.start(Setup(JOINT_CUSUM, SEDAN, 0.01, 1.0)).push(Scene(f | more, scene.braking, {}, bare, shared))
+    output = JOINT_CUSUM.start(Setup(JOINT_CUSUM, SEDAN, 0.01, 1.0)).push(
+        Scene(f | more, scene.braking, {}, bare, shared)
+    )
     assert (output.features["joint_term_spin_up"] > 0.0).any() == begins
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from aqualog.core.notation import WHEELS
 from aqualog.detect.detector import Scene
+from aqualog.detect.margin import recursion
 from aqualog.detect.margin.emissions import emissions_of
 from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.state import NODES
@@ -16,6 +17,7 @@ from aqualog.model.drawing import SCORING_POOL
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import draw
+from aqualog.physics.tyre_brush import brush_force
 from aqualog.report.drive.document import document
 from aqualog.report.drive.panels import drive_rows
 from tests.drives import CAR, drive, lane
@@ -110,7 +112,9 @@ def test_a_wheel_signal_that_stands_still_is_none():
 
 def test_the_distance_is_from_the_car_s_own_speed():
     """Below 40 km/h nothing is read, but a car that brakes in the water goes further away from floating."""
-    deep = drive(CAR, duration_s=14.0, lanes=(lane(6.0, 14.0, 6e-3),), speed_kmh=((0.0, 66.0), (9.0, 66.0), (12.0, 10.0)))
+    deep = drive(
+        CAR, duration_s=14.0, lanes=(lane(6.0, 14.0, 6e-3),), speed_kmh=((0.0, 66.0), (9.0, 66.0), (12.0, 10.0))
+    )
     f = detect_drive(deep[0], CAR).features
     v, margin, full = (f[n].to_numpy()[-50:] for n in ("v_x_hat", "aquaplaning_margin", "full_speed_expected"))
     assert np.isfinite(margin).all()
@@ -127,6 +131,12 @@ def test_traction_is_that_of_the_torque_behind_the_driveline():
     f = FeatureStream(car, 0.01, columns).push(columns)
     seen = Reader(car, 0.01).push(Scene(f, dict.fromkeys(WHEELS, one < 0.0), columns))
     assert seen.u_rl[-1] == pytest.approx(f["mu_rl"][-1] + car.rolling_resistance, rel=1e-3)
+
+
+@pytest.mark.parametrize("u", [-0.24, 0.05, 0.24])
+def test_what_a_dry_wheel_shows_is_the_brush(u):
+    s = recursion._slip(u, 31.0, 0.0105, 1.02)
+    assert brush_force(np.array([s]), np.ones(1), mu=1.02, C_s=31.0)[0] == pytest.approx(u - 0.0105, rel=1e-9)
 
 
 def test_without_torque_it_does_not_run():

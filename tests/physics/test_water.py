@@ -120,7 +120,7 @@ def test_odd_and_bounded():
 
 
 def test_reaches_friction_at_the_full_sliding_slip():
-    s = tyre_brush.full_sliding_slip(one(F_Z), mu=MU, C_s=C_S)[0]
+    s = tyre_brush.brush_slip(one(MU), mu=MU, slope=C_S / F_Z)[0]
     assert s == pytest.approx(3 * 0.9 * 4000 / 120e3)
     assert force([s])[0] == pytest.approx(MU * F_Z, rel=1e-12)
     assert force([0.98 * s])[0] < MU * F_Z * (1 - 1e-6)

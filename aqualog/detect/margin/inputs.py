@@ -104,7 +104,7 @@ class Reader:
         return np.asarray(bits)
 
     def _traction(self, scene: Scene) -> list[FloatArray]:
-        """Force over load of each wheel by its torque, rolling resistance left in; in a curve the outer ones carry more. [-]"""
+        """Torque over lever and load of each wheel; in a curve the outer ones carry more. [-]"""
         vehicle, f = self._vehicle, scene.f
         none = np.zeros(scene.size)
         loads = wheel_loads(

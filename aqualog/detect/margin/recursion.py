@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from aqualog.core.compiled import compiled, part
+from aqualog.core.compiled import compiled, inlined, part
 from aqualog.core.records import FloatArray
 from aqualog.detect.margin.state import (
     COVARIATES,
@@ -24,8 +24,11 @@ from aqualog.detect.margin.state import (
     FilterParams,
     Inputs,
 )  # fmt: skip
+from aqualog.physics.tyre_brush import brush_slip
 
 __all__ = ["scan"]
+
+_brush_slip = inlined(brush_slip)
 
 _NV, _NX, _NN = FULL_SPEEDS.size, len(FEATURES), NODES.size
 _LOG = np.log(FULL_SPEEDS)
@@ -37,10 +40,8 @@ _LEAST = 1e-10  # of a slip's variance
 
 @part
 def _slip(u, slope, rolling, friction):  # type: ignore[no-untyped-def]
-    """Slip of a dry axle by its traction; within ±1. [-]"""
-    F = u - rolling
-    left = max(1.0 - abs(F) / friction, 0.01)
-    return min(max(F / slope / math.sqrt(left), -1.0), 1.0)
+    """Slip of a dry wheel by the traction of its torque. [-]"""
+    return _brush_slip(u - rolling, friction, slope)
 
 
 @part
