@@ -250,10 +250,8 @@ def _inputs(car: HalfCar, run: HalfCarRun, t: FloatArray) -> tuple[_Inputs, floa
     rolling_r = resistance.rolling_resistance_force(F_z_r, r_w=car.r_w)
     torque_f = car.r_l_f * (F_f + rolling_f) + car.inertia_f * run.a_x / car.r_e_f
     torque_r = car.r_l_r * (F_r + rolling_r) + car.inertia_r * run.a_x / car.r_e_r
-    s_f, s_r = (
-        float(tyre_brush.brush_slip(F[:1] / F_z, mu=float(mu[0]), slope=float(slope[0]))[0])
-        for F, F_z, slope in ((F_f, F_z_f, slope_f), (F_r, F_z_r, slope_r))
-    )
+    s_f = float(tyre_brush.brush_slip(F_f[:1] / F_z_f, mu=mu[0], slope=slope_f[0])[0])
+    s_r = float(tyre_brush.brush_slip(F_r[:1] / F_z_r, mu=mu[0], slope=slope_r[0])[0])
     return _Inputs(torque_f, torque_r, slope_f, slope_r, mu), s_f, s_r
 
 

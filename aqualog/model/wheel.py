@@ -294,9 +294,13 @@ def water_at(film, F_z, v_even, along, rim, mu, q):  # type: ignore[no-untyped-d
     gain = q.water_drag_gain * _skimming_share(ahead, v_full)
     film_force = gain * _film_drag(film, ahead, rim, q.width, q.tread_capacity, q.h_film, q.groove_relief)
     skid = max(ahead - rim, 0.0)  # a slower tread pushes what it no longer throws
-    wave = way * gain * (
-        _wave_drag(film, ahead, q.width, q.h_wave)
-        + _film_drag(film, ahead, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+    wave = (
+        way
+        * gain
+        * (
+            _wave_drag(film, ahead, q.width, q.h_wave)
+            + _film_drag(film, ahead, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+        )
     )
     return Contact(L, mu * q.wet_friction, film_force, wave, shift, v_full)
 

@@ -174,21 +174,10 @@ def brush_slope(s_x: FloatArray, F_z: FloatArray, *, mu: float, C_s: float, L: F
 
 
 def brush_slip(mu_x: FloatArray, *, mu: float, slope: float) -> FloatArray:
-    """Slip at which a full contact transmits a traction coefficient: the inverse of `brush_force`.
+    """Slip (3.13) at which a full contact transmits a traction coefficient F_x / F_z: the inverse of `brush_force`. [-]
 
-    Parameters
-    ----------
-    mu_x : array
-        F_x / F_z; beyond the friction it counts as that. [-]
-    mu, slope : float
-        Friction, and slip slope C_s / F_z at no slip, > 0. [-]
-
-    Returns
-    -------
-    s_x : array
-        By (3.13), driving positive; at most 3 mu / slope, from which on the whole contact slides. [-]
-
-    The cubic solved: |mu_x| / mu = 1 - (1 - slope |s_x| / 3 mu)^3.
+    Driving positive. `mu`, `slope`: friction, and C_s / F_z at no slip, > 0. [-] The cubic |mu_x| / mu = 1 - (1 - slope
+    |s_x| / 3 mu)^3, solved; from mu on the slip is 3 mu / slope, at which the whole contact begins to slide.
 
     Source: chapter 3 of Pacejka [pacejka2012].
     """

@@ -528,8 +528,7 @@ def test_a_wheel_that_rolls_backwards_is_none_that_stands():
     """On a car that has turned round they float as they do forwards, and water holds it back."""
     _, wheels, _ = flat(build_plant(SEDAN, TYRES["worn_summer"], TYRES["worn_summer"]))
     ahead, back, stands = (
-        water_at(3e-3, 4000.0, 33.0, v, rim, 1.0, wheels[0])
-        for v, rim in ((28.0, 28.0), (-28.0, -28.0), (-28.0, 0.0))
+        water_at(3e-3, 4000.0, 33.0, v, rim, 1.0, wheels[0]) for v, rim in ((28.0, 28.0), (-28.0, -28.0), (-28.0, 0.0))
     )
     assert back.v_full == ahead.v_full
     assert back.contact == ahead.contact
