@@ -524,6 +524,19 @@ def test_absurd_water_ends_in_a_drive():
     assert np.hypot(c["v_x"], c["true_v_y"]).max() < 1.05 * 83.0  # it may turn round, not gain speed
 
 
+def test_a_car_that_turns_round_goes_on_along_its_road():
+    rows, _ = raw(
+        scenario(
+            speed=((0.0, 25.0),), lanes=(Lane(3.0, 20.0, surface=SURFACES["ice"]),), duration_s=12.0,
+            steering=Steering(0.03, 4.0),
+        ), every=10,
+    )  # fmt: skip
+    v_x, v_y, psi = (col(rows, n) for n in ("v_x", "v_y", "psi"))
+    assert np.abs(psi).max() > 2.0
+    along = np.cumsum(v_x * np.cos(psi) - v_y * np.sin(psi)) * 0.01
+    assert col(rows, "position")[-1] == pytest.approx(along[-1], rel=0.01)
+
+
 def test_a_wheel_that_rolls_backwards_is_none_that_stands():
     """On a car that has turned round they float as they do forwards, and water holds it back."""
     _, wheels, _ = flat(build_plant(SEDAN, TYRES["worn_summer"], TYRES["worn_summer"]))
