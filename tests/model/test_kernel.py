@@ -525,12 +525,9 @@ def test_absurd_water_ends_in_a_drive():
 
 
 def test_a_car_that_turns_round_goes_on_along_its_road():
-    rows, _ = raw(
-        scenario(
-            speed=((0.0, 25.0),), lanes=(Lane(3.0, 20.0, surface=SURFACES["ice"]),), duration_s=12.0,
-            steering=Steering(0.03, 4.0),
-        ), every=10,
-    )  # fmt: skip
+    ice = Lane(3.0, 20.0, surface=SURFACES["ice"])
+    turned = scenario(speed=((0.0, 25.0),), lanes=(ice,), duration_s=12.0, steering=Steering(0.03, 4.0))
+    rows, _ = raw(turned, every=10)
     v_x, v_y, psi = (col(rows, n) for n in ("v_x", "v_y", "psi"))
     assert np.abs(psi).max() > 2.0
     along = np.cumsum(v_x * np.cos(psi) - v_y * np.sin(psi)) * 0.01

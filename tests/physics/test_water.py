@@ -55,13 +55,6 @@ def test_lost_contact(n):
     assert contact.lost_contact(v, one(np.inf), exponent=n).tolist() == [0.0] * 5
 
 
-def test_contact_20_kmh_below_full_by_exponent():
-    """numbers.md (b): at 98 of 118 km/h, n = 2, 4, 6 leave L = .31, .53, .67 and C = .10, .28, .45."""
-    L = np.array([contact.contact_share(one(98.0), one(118.0), exponent=n)[0] for n in (2.0, 4.0, 6.0)])
-    assert pytest.approx([0.31, 0.53, 0.67], abs=0.01) == L
-    assert contact.slip_stiffness_ratio(L) == pytest.approx([0.10, 0.28, 0.45], abs=0.01)
-
-
 def test_contact_half_length():
     kw = {"a_ref": 0.07, "F_z_ref": 4000.0, "p_ref": 2.2e5}
     assert contact.contact_half_length(np.array([-50.0, 0.0, 4000.0]), p=2.2e5, **kw) == pytest.approx([0, 0, 0.07])
