@@ -99,7 +99,8 @@ def _chord(slope: float, L: float, mu_max: float, mu_range: tuple[float, float] 
 def _shares(L: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> FloatArray:
     """Regression slope of the shortened contact over the tangent of the full one, (m,).
 
-    NaN where L cannot carry the traction, or the range is empty.
+    NaN where L cannot carry the traction, or the range is empty. The secant over the range stands for the regression
+    line: 1 % off for L >= 0.8, up to 6 % for 0.5, by how the traction is spread; 0.007 of L at most (D).
 
     Depends on the traction over the friction only: the brush's force over mu F_z is a function of C s / (3 mu F_z).
     """

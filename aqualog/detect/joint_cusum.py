@@ -10,7 +10,7 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect import cusum
 from aqualog.detect.braking import hold_on
-from aqualog.detect.detector import Detector, Found, JointCusumParams, Output, Scene, Setup, traction
+from aqualog.detect.detector import Detector, Found, JointCusumParams, Output, Scene, Setup
 from aqualog.detect.events import AFTER
 from aqualog.detect.joint_criteria import (
     FULL,
@@ -26,7 +26,7 @@ from aqualog.detect.joint_criteria import (
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import MEASURE, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
-from aqualog.detect.spin import MU_SPIN_UP, SPIN_DOWN, SPIN_UP
+from aqualog.detect.spin import SPIN_DOWN, SPIN_UP, has_lost_traction
 
 __all__ = ["JOINT_CUSUM", "TERMS", "JointCusumParams", "JointCusumWatch", "terms"]
 
@@ -123,17 +123,14 @@ def _counts(track: Track, scene: Scene) -> BoolArray:
     """Flag samples without a braking force on the statistic's wheel.
 
     Of a variance 0.7 must belong to one axle. A wheel that spins up must have lost its traction, as the single detector
-    asks (C27): on a dry road the engine spins it up with all of it.
+    asks (C27), and not in a car that spins round: on a dry road the engine spins it up with all of it.
     """
     bits = ~scene.braking[track.wheel] if track.wheel is not None else np.ones(scene.size, dtype=bool)
     if track.detector == MINOR_SPIN_DOWN.name:
         with np.errstate(invalid="ignore"):
             bits &= track.statistic > ALONE * scene.f.get(f"variance_{track.wheel}", track.statistic)
     if track.detector == SPIN_UP.name and track.wheel is not None:
-        mu = traction(scene.f, track.wheel)
-        if mu is not None:
-            with np.errstate(invalid="ignore"):
-                bits &= track.active | (mu < MU_SPIN_UP)
+        bits &= track.active | has_lost_traction(scene.f, track.wheel)
     return bits
 
 

@@ -30,11 +30,12 @@ from aqualog.detect.detector import (
     too_slow,
     traction,
 )
+from aqualog.features.stream import Features
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
     "HELD_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SPIN_UP", "SpinParams", "SpinState",
-    "SpinWatch", "initial_state", "scan", "wheel_evidence",
+    "SpinWatch", "has_lost_traction", "initial_state", "scan", "wheel_evidence",
 ]  # fmt: skip
 
 THRESHOLD = 0.6  # [m/s]
@@ -174,17 +175,24 @@ class SpinWatch:
         for wheel in (w for w in scene.wheels if w in self._wheels):
             # only a spinning driven wheel has the water's resistance booked on it
             mu = traction(f, wheel) if self._is_up else f.get(f"mu_{wheel}")
-            allowed = np.ones(scene.size, dtype=bool)
-            if self._is_up and mu is not None:
-                drift = f["a_y_slow"] - f["v_x_hat"] * f["yaw_rate_slow"]
-                with np.errstate(invalid="ignore"):
-                    allowed = (mu < MU_SPIN_UP) & ~(np.abs(drift) > SIDEWAYS)
+            allowed = has_lost_traction(f, wheel) if self._is_up else np.ones(scene.size, dtype=bool)
             g, bits, self._states[wheel] = scan(
                 self._params, self._states[wheel], f[f"a_w_delta_{wheel}"], f[f"v_w_delta_{wheel}"], f["v_x_hat"],
                 allowed,
             )  # fmt: skip
             found.append(Found(self._setup.track(g, bits, wheel=wheel), wheel_evidence(scene, wheel, mu)))
         return Output(tuple(found))
+
+
+def has_lost_traction(f: Features, wheel: str) -> BoolArray:
+    """Where a spin-up of a driven wheel may be water's (n,): little traction, where known (C27), and no spinning car.
+
+    A car that spins round drifts: a_y - v_x yaw_rate, the rate of its lateral velocity, is large.
+    """
+    mu = traction(f, wheel)
+    with np.errstate(invalid="ignore"):
+        goes_on = ~(np.abs(f["a_y_slow"] - f["v_x_hat"] * f["yaw_rate_slow"]) > SIDEWAYS)
+        return goes_on if mu is None else goes_on & (mu < MU_SPIN_UP)
 
 
 def wheel_evidence(scene: Scene, wheel: str, mu: FloatArray | None) -> dict[str, Any]:

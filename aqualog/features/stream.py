@@ -101,7 +101,7 @@ class FeatureStream:
         if self._has_wheels:
             self._differences(v_w, v_x, a_kin, out)
         a_x = get["a_x"] if "a_x" in self.available else a_kin
-        a_y = get["a_y"] if "a_y" in self.available else v_x * yaw_rate
+        a_y = np.where(np.isnan(get["a_y"]), v_x * yaw_rate, get["a_y"])  # as of a car that does not slide
         out["a_x_slow"] = self._lowpass("a_x", a_x, TAU_LOAD)
         out["a_y_slow"] = self._lowpass("a_y", np.nan_to_num(a_y), TAU_LOAD)
         out["a_kin_slow"] = self._lowpass("a_kin_slow", a_kin, TAU_LOAD)

@@ -76,8 +76,8 @@ def _step(p, motion, kappa, age, v_ref, w, weights, a_x, a_y, yaw_rate):  # type
     if not p.has_accelerometer:
         a = -b
     elif not math.isnan(a_x):
-        drift = a_y - yaw_rate * v - v_y / p.tau_side
-        v_y = 0.0 if math.isnan(drift) else v_y + drift * p.dt
+        aside = a_y - yaw_rate * v
+        v_y += ((0.0 if math.isnan(aside) else aside) - v_y / p.tau_side) * p.dt
         a = a_x - b + (0.0 if math.isnan(yaw_rate) else yaw_rate * v_y)
     else:
         a = a * (1.0 - p.dt / p.fade)  # a gap: the last acceleration fades
@@ -231,7 +231,7 @@ def observe(
     a_x : array (n,)
         Accelerometer, specific force; NaN where missing. [m/s²]
     a_y : array (n,)
-        The same to the left; where it is missing the car does not slide. [m/s²]
+        The same to the left; where it is missing a drift fades. [m/s²]
     yaw_rate : array (n,)
         NaN where missing. [rad/s]
     weights : array (4,)

@@ -225,12 +225,6 @@ def _axle_loads(car: HalfCar, a_x: float) -> tuple[FloatArray, FloatArray]:
     return fl + fr, rl + rr
 
 
-def _slip_of_force(F_x: FloatArray, F_z: FloatArray, *, mu: float, slope: float) -> float:
-    """Slip at which the brush gives a force; where full sliding begins, if it cannot."""
-    theta = 1.0 - np.cbrt(1.0 - np.minimum(np.abs(F_x) / (mu * F_z), 1.0))
-    return float((np.sign(F_x) * theta * tyre_brush.full_sliding_slip(F_z, mu=mu, C_s=slope * F_z[0]))[0])
-
-
 def _inputs(car: HalfCar, run: HalfCarRun, t: FloatArray) -> tuple[_Inputs, float, float]:
     """Return torques and surface over the drive, and the slips at its start."""
     v = run.v0 + run.a_x * (t - run.t_start)
@@ -256,8 +250,8 @@ def _inputs(car: HalfCar, run: HalfCarRun, t: FloatArray) -> tuple[_Inputs, floa
     rolling_r = resistance.rolling_resistance_force(F_z_r, r_w=car.r_w)
     torque_f = car.r_l_f * (F_f + rolling_f) + car.inertia_f * run.a_x / car.r_e_f
     torque_r = car.r_l_r * (F_r + rolling_r) + car.inertia_r * run.a_x / car.r_e_r
-    s_f = _slip_of_force(F_f[:1], F_z_f, mu=float(mu[0]), slope=float(slope_f[0]))
-    s_r = _slip_of_force(F_r[:1], F_z_r, mu=float(mu[0]), slope=float(slope_r[0]))
+    s_f = float(tyre_brush.brush_slip(F_f[:1] / F_z_f, mu=mu[0], slope=slope_f[0])[0])
+    s_r = float(tyre_brush.brush_slip(F_r[:1] / F_z_r, mu=mu[0], slope=slope_r[0])[0])
     return _Inputs(torque_f, torque_r, slope_f, slope_r, mu), s_f, s_r
 
 

@@ -216,8 +216,8 @@ def _move(m, a_x, a_y, uphill, turning, nudge, roll_time):  # type: ignore[no-un
     f[V_Y] = a_y - y[YAW_RATE] * y[V_X]
     f[YAW_RATE] = turning
     f[PSI] = y[YAW_RATE]
-    f[S] = y[V_X]
-    f[Y_LAT] = y[V_Y] + y[V_X] * np.sin(y[PSI])
+    f[S] = np.sqrt(y[V_X] * y[V_X] + y[V_Y] * y[V_Y])  # the length of its path: a car that turns round goes on
+    f[Y_LAT] = y[V_Y] * np.cos(y[PSI]) + y[V_X] * np.sin(y[PSI])
     f[A_X] = (a_x - y[A_X]) / roll_time
     f[A_Y] = (a_y - y[A_Y]) / roll_time
 

@@ -282,20 +282,25 @@ def water_at(film, F_z, v_even, along, rim, mu, q):  # type: ignore[no-untyped-d
 
     `v_even` [m/s]: full aquaplaning of a rolling wheel here; speeds [m/s] of the wheel's centre and of its rim.
     """
+    way = 1.0 if along >= 0.0 else -1.0  # water acts on a car that has turned round as it does on one that goes ahead
+    ahead, rim = way * along, way * rim
     # a wheel that has slowed down floats down to a lower speed: Horne's spin-up speed
-    rolling_share = min(max(rim / max(abs(along), 0.5), 0.0), 1.0)
+    rolling_share = min(max(rim / max(ahead, 0.5), 0.0), 1.0)
     v_full = v_even * (_SPIN_UP_RATIO + (1.0 - _SPIN_UP_RATIO) * rolling_share)
     lost = _lost_contact(along, v_full, q.contact_exponent) * q.contact_gain
     L = 1.0 - min(max(lost, 0.0), 1.0)
     half = _half_length(F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
     shift = _load_shift(L, half, q.wedge_arm) * F_z
-    ahead = max(along, 0.0)
     gain = q.water_drag_gain * _skimming_share(ahead, v_full)
     film_force = gain * _film_drag(film, ahead, rim, q.width, q.tread_capacity, q.h_film, q.groove_relief)
-    skid = max(along - rim, 0.0)  # a slower tread pushes what it no longer throws
-    wave = gain * (
-        _wave_drag(film, ahead, q.width, q.h_wave)
-        + _film_drag(film, ahead, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+    skid = max(ahead - rim, 0.0)  # a slower tread pushes what it no longer throws
+    wave = (
+        way
+        * gain
+        * (
+            _wave_drag(film, ahead, q.width, q.h_wave)
+            + _film_drag(film, ahead, skid, q.width, q.tread_capacity, q.h_film, q.groove_relief)
+        )
     )
     return Contact(L, mu * q.wet_friction, film_force, wave, shift, v_full)
 

@@ -118,7 +118,8 @@ def kingpin_moment(
 
     A rolling or driven wheel turns on bearings: its longitudinal force acts at the wheel centre, with the hub offset as
     its lever, and backward forces turn it outward. Under braking the lever is the scrub radius,
-    hub_offset - r_l sin(inclination). A load that the wedge carries ahead of the centre is a moment about the wheel's
+    hub_offset - r_l sin(inclination). The load acts about both leans of the kingpin: scrub radius times sin(caster) and
+    caster trail times sin(inclination). A load that the wedge carries ahead of the centre is a moment about the wheel's
     axis. The bearings do not pass it on: it slows the wheel down and comes back as longitudinal force. Small angles; no
     steer angle, no inertia of the wheel about the kingpin, no friction, no toe.
 
@@ -131,7 +132,7 @@ def kingpin_moment(
         - geometry.caster_trail * F_y_outward
         - geometry.hub_offset * F_x
         - sine * braking
-        - scrub * np.sin(geometry.caster) * F_z
+        - (scrub * np.sin(geometry.caster) + geometry.caster_trail * sine) * F_z
     )
     return moment
 

@@ -10,9 +10,9 @@ __all__ = [
     "brush_force",
     "brush_forces",
     "brush_parts",
+    "brush_slip",
     "brush_slope",
     "brush_stiffness",
-    "full_sliding_slip",
     "sliding_edge",
 ]
 
@@ -100,8 +100,8 @@ def brush_force(s_x: FloatArray, F_z: FloatArray, *, mu: float, C_s: float, L: F
         Force on the vehicle, forward positive. [N]
 
     Limits: slope C_s L^2 at 0, which holds no mu (C2); odd in s_x; |F_x| <= mu F_z L^2 (3 - 2 L), reached on a full
-    contact at `full_sliding_slip`, on a shortened one only as the slip grows without bound, since pressure holds its
-    first bristles; no load, no friction or no contact, no force. NaN in, NaN out. Rigid carcass, equal friction of
+    contact at a slip of 3 mu F_z / C_s, on a shortened one only as the slip grows without bound, since pressure holds
+    its first bristles; no load, no friction or no contact, no force. NaN in, NaN out. Rigid carcass, equal friction of
     sticking and sliding bristles.
 
     Thesis [fichtinger2024]: section 3.1; (2.1) and (2.2) are its limits at large and small slip.
@@ -173,9 +173,13 @@ def brush_slope(s_x: FloatArray, F_z: FloatArray, *, mu: float, C_s: float, L: F
     return C_s * stuck * stuck
 
 
-def full_sliding_slip(F_z: FloatArray, *, mu: float, C_s: float) -> FloatArray:
-    """Slip from which the whole of a full contact slides, 3 mu F_z / C_s. [-]
+def brush_slip(mu_x: FloatArray, *, mu: float, slope: float) -> FloatArray:
+    """Slip (3.13) at which a full contact transmits a traction coefficient F_x / F_z: the inverse of `brush_force`. [-]
+
+    Driving positive. `mu`, `slope`: friction, and C_s / F_z at no slip, > 0. [-] The cubic |mu_x| / mu = 1 - (1 - slope
+    |s_x| / 3 mu)^3, solved; from mu on the slip is 3 mu / slope, at which the whole contact begins to slide.
 
     Source: chapter 3 of Pacejka [pacejka2012].
     """
-    return 3.0 * mu * F_z / C_s
+    held = (1.0 - np.minimum(np.abs(mu_x) / mu, 1.0)) ** (1.0 / 3.0)
+    return np.copysign(3.0 * mu / slope * (1.0 - held), mu_x)

@@ -171,6 +171,8 @@ def _stop(
         reasons.append(f"{1e3 * depth:.1f} mm of water, {limits.depth_low:g} to {limits.depth_high:g} mm expected")
     if math.isnan(temperature):
         notes.append("no temperature: the coefficient is that of the day")
+    elif math.isnan(conditions.temperature):
+        notes.append("the temperature is that of the air, where the wetted road's belongs (x_temperature_c)")
     if math.isnan(conditions.texture):
         notes.append("no macrotexture depth (x_texture_mm) in the campaign")
     elif not limits.texture_low <= 1e3 * conditions.texture <= limits.texture_high:
@@ -205,7 +207,7 @@ def _reasons(
 
 
 def _temperature(signals: Signals, inside: BoolArray, conditions: Conditions) -> float:
-    """Return the temperature of the campaign, else of the log. [degC]"""
+    """Return the wetted road's temperature by the campaign (K, [unece_r117_2011]), else the air's by the log. [degC]"""
     if math.isfinite(conditions.temperature):
         return conditions.temperature
     seen = signals.array("ambient_temperature")[inside]

@@ -24,7 +24,7 @@ NOTHING = np.zeros(N, dtype=bool)
 
 def scene(tracks=(), x=0.3, v_x=27.0, **shared):
     features = {"v_x_hat": np.full(N, v_x), "delta_a_x": np.full(N, 0.3), "criterion_full": np.zeros(N)}
-    features |= {f"v_w_{w}": np.full(N, v_x) for w in WHEELS}
+    features |= {f"v_w_{w}": np.full(N, v_x) for w in WHEELS} | {"a_y_slow": np.zeros(N), "yaw_rate_slow": np.zeros(N)}
     shared = {
         MEASURE: np.broadcast_to(x, (N,)).astype(float),
         GATE: ~NOTHING,

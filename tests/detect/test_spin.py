@@ -1,5 +1,7 @@
 """Large spins of one wheel: when an alarm may begin, and how severe a spin-up is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,13 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import Track
 from aqualog.detect.detector import Scene, Setup
 from aqualog.detect.events import EventBook
+from aqualog.detect.joint_criteria import GATE, GATE_AFTER, MAY_BE_WATER
+from aqualog.detect.joint_cusum import JOINT_CUSUM
+from aqualog.detect.resistance import MEASURE
 from aqualog.detect.spin import HELD_S, SPIN_DOWN, SPIN_UP, SpinParams, SpinWatch, initial_state, scan
+from aqualog.features.stream import FeatureStream
+from aqualog.features.velocity import initial_state as initial_motion
+from aqualog.features.velocity import observe, params_from_seconds
 from aqualog.model.programme import SEDAN
 
 DT = 0.01
@@ -48,8 +56,37 @@ def test_a_car_that_spins_round_has_no_spin_up(yaw_rate, begins):
     }
     f |= {"v_x_hat": 20.0 * one, "a_y_slow": 0.0 * one, "yaw_rate_slow": yaw_rate * one}
     watch = SpinWatch(Setup(SPIN_UP, SEDAN, 0.01, 0.6), sign=1.0)
-    found = watch.push(Scene(f, dict.fromkeys(WHEELS, one < 0))).found
+    scene = Scene(f, dict.fromkeys(WHEELS, one < 0))
+    found = watch.push(scene).found
     assert [x.track.active.any() for x in found] == [begins, begins]
+    # nor does a wheel that has not begun one count in the sum
+    bare = tuple(replace(x.track, active=one < 0) for x in found)
+    more = {"delta_a_x": one, "criterion_full": one}
+    shared = {MEASURE: one, GATE: one > 0, GATE_AFTER: one, MAY_BE_WATER: one > 0}
+    output = JOINT_CUSUM.start(Setup(JOINT_CUSUM, SEDAN, 0.01, 1.0)).push(
+        Scene(f | more, scene.braking, {}, bare, shared)
+    )
+    assert (output.features["joint_term_spin_up"] > 0.0).any() == begins
+
+
+def test_a_gap_of_the_lateral_acceleration_is_no_slide():
+    t = np.arange(400) * DT
+    v, yaw_rate = np.full(400, 20.0), np.full(400, 0.25)
+    columns = {"v_x": v, "a_x": 0.0 * v, "a_y": np.where((t > 2.0) & (t < 3.0), np.nan, 5.0), "yaw_rate": yaw_rate}
+    columns |= {f"omega_{w}": v / SEDAN.r_e(w) for w in WHEELS}
+    f = FeatureStream(SEDAN, DT, columns).push(columns)
+    assert f["a_y_slow"][100:] == pytest.approx(5.0, rel=0.01)
+
+
+@pytest.mark.parametrize("every", [2, 10])
+def test_lost_samples_leave_a_slide_known(every):
+    """A car that slides while it turns: all of its acceleration, -0.5 m/s² after 2 s, is that of its turning."""
+    t, wheels = np.arange(200) * DT, np.full((4, 200), np.nan)
+    v, lossy = 20.0 - 0.125 * t * t, np.arange(200) % every == 0
+    a_y = np.where(lossy, np.nan, 0.5 - 0.5 * v)  # the drift to the left grows by 0.5 m/s² at a yaw rate of -0.5 rad/s
+    p = params_from_seconds(DT, has_accelerometer=True)
+    _, a, _, _ = observe(p, initial_motion(), v, wheels, 0.0 * t, a_y, 0.0 * t - 0.5, weights=np.ones(4))
+    assert a[-1] < -0.1
 
 
 def test_a_spin_down_does_not_wait():

@@ -1,15 +1,23 @@
 """The distance to full aquaplaning: it falls with speed, warns before it, and stays silent on dry roads."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from aqualog.core.notation import WHEELS
+from aqualog.detect.detector import Scene
+from aqualog.detect.margin import recursion
 from aqualog.detect.margin.emissions import emissions_of
+from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.state import NODES
 from aqualog.detect.stream import detect_drive
+from aqualog.features.stream import FeatureStream
 from aqualog.model.drawing import SCORING_POOL
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import draw
+from aqualog.physics.tyre_brush import brush_force
 from aqualog.report.drive.document import document
 from aqualog.report.drive.panels import drive_rows
 from tests.drives import CAR, drive, lane
@@ -100,6 +108,35 @@ def test_a_wheel_signal_that_stands_still_is_none():
     assert np.isfinite(whole[gone]).all()
     assert np.isnan(part[gone]).all()
     assert np.isfinite(part[round(7.6 / 0.1) : 80]).all()
+
+
+def test_the_distance_is_from_the_car_s_own_speed():
+    """Below 40 km/h nothing is read, but a car that brakes in the water goes further away from floating."""
+    deep = drive(
+        CAR, duration_s=14.0, lanes=(lane(6.0, 14.0, 6e-3),), speed_kmh=((0.0, 66.0), (9.0, 66.0), (12.0, 10.0))
+    )
+    f = detect_drive(deep[0], CAR).features
+    v, margin, full = (f[n].to_numpy()[-50:] for n in ("v_x_hat", "aquaplaning_margin", "full_speed_expected"))
+    assert np.isfinite(margin).all()
+    assert v.max() < 16.0 / KMH
+    assert margin == pytest.approx(full - v, abs=1.0 / KMH)
+
+
+def test_traction_is_that_of_the_torque_behind_the_driveline():
+    car = replace(CAR, driveline_inertia=6.0, torque_arm="loaded", r_l_r=0.28)
+    t = np.arange(400) * 0.01
+    v, one = 20.0 + 0.4 * t, np.ones(400)
+    columns = {"v_x": v, "a_x": 0.4 * one, "a_y": 0.0 * one, "yaw_rate": 0.0 * one}
+    columns |= {f"omega_{w}": v / car.r_e(w) for w in WHEELS} | {f"torque_{w}": 150.0 * one for w in car.driven}
+    f = FeatureStream(car, 0.01, columns).push(columns)
+    seen = Reader(car, 0.01).push(Scene(f, dict.fromkeys(WHEELS, one < 0.0), columns))
+    assert seen.u_rl[-1] == pytest.approx(f["mu_rl"][-1] + car.rolling_resistance, rel=1e-3)
+
+
+@pytest.mark.parametrize("u", [-0.24, 0.05, 0.24])
+def test_what_a_dry_wheel_shows_is_the_brush(u):
+    s = recursion._slip(u, 31.0, 0.0105, 1.02)
+    assert brush_force(np.array([s]), np.ones(1), mu=1.02, C_s=31.0)[0] == pytest.approx(u - 0.0105, rel=1e-9)
 
 
 def test_without_torque_it_does_not_run():

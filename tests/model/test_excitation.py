@@ -81,11 +81,6 @@ def test_ramp_sections_are_a_sixth_of_the_period():
     assert np.diff(f[rising]) == pytest.approx(6.0 / N)
 
 
-def test_ramp_is_the_clipped_triangle():
-    triangle = f_triangle(PERIOD, period=TAU)
-    assert np.array_equal(f_ramp(PERIOD, period=TAU), np.clip(1.5 * triangle, -1.0, 1.0))
-
-
 def test_step_and_its_printed_phase():
     """E18."""
     t = np.array([0.0, 0.1 * TAU, 0.49 * TAU, 0.5 * TAU, 0.51 * TAU, 0.99 * TAU])

@@ -11,11 +11,13 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import Vehicle
 from aqualog.model import kernel, state
 from aqualog.model.effects import EFFECTS
+from aqualog.model.plant import build_plant, flat
 from aqualog.model.scenario import SURFACES, Excitation, Lane, Scenario, Steering
 from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import assemble, drive_truth, run_kernel, simulate
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
+from aqualog.model.wheel import water_at
 from aqualog.physics.load import G, wheel_loads
 from tests.thesis.passes import SEDAN, resistance, slip_and_traction
 
@@ -520,6 +522,29 @@ def test_absurd_water_ends_in_a_drive():
     _, c = truth(scenario(Vehicle(), speed=((0.0, 83.0),), lanes=(deep,)), Model().with_term(term))
     assert np.isfinite(c["v_x"]).all()
     assert np.hypot(c["v_x"], c["true_v_y"]).max() < 1.05 * 83.0  # it may turn round, not gain speed
+
+
+def test_a_car_that_turns_round_goes_on_along_its_road():
+    ice = Lane(3.0, 20.0, surface=SURFACES["ice"])
+    turned = scenario(speed=((0.0, 25.0),), lanes=(ice,), duration_s=12.0, steering=Steering(0.03, 4.0))
+    rows, _ = raw(turned, every=10)
+    v_x, v_y, psi = (col(rows, n) for n in ("v_x", "v_y", "psi"))
+    assert np.abs(psi).max() > 2.0
+    along = np.cumsum(v_x * np.cos(psi) - v_y * np.sin(psi)) * 0.01
+    assert col(rows, "position")[-1] == pytest.approx(along[-1], rel=0.01)
+
+
+def test_a_wheel_that_rolls_backwards_is_none_that_stands():
+    """On a car that has turned round they float as they do forwards, and water holds it back."""
+    _, wheels, _ = flat(build_plant(SEDAN, TYRES["worn_summer"], TYRES["worn_summer"]))
+    ahead, back, stands = (
+        water_at(3e-3, 4000.0, 33.0, v, rim, 1.0, wheels[0]) for v, rim in ((28.0, 28.0), (-28.0, -28.0), (-28.0, 0.0))
+    )
+    assert back.v_full == ahead.v_full
+    assert back.contact == ahead.contact
+    assert back.film_force == ahead.film_force > 0.0  # against the turning
+    assert stands.wave < back.wave == -ahead.wave < 0.0  # against the motion
+    assert stands.contact < back.contact
 
 
 def test_masses_that_leave_no_car_are_refused():

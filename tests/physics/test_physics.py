@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from aqualog.physics.contact import friction_ratio, slip_stiffness_ratio
-from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
 from aqualog.physics.load import G, wheel_loads
 from aqualog.physics.resistance import air_drag, nominal_acceleration
 from aqualog.physics.slip import slip_of_wheel_speed, wheel_slip
@@ -24,25 +23,6 @@ def test_thesis_slip_agrees_for_small_slip():
     assert wheel_slip(omega, v, r_e)[0] == pytest.approx(0.1 / 30.0)
     assert wheel_slip(omega, v, r_e)[0] == pytest.approx(slip_of_wheel_speed(omega * r_e, v)[0], rel=0.01)
     assert np.isnan(wheel_slip(np.zeros(1), v, r_e)[0])
-
-
-def test_centre_line_of_a_left_turn():
-    """A car rolling around a curve without slip: all wheels must give the same centre-line speed."""
-    v, psi_dot, l, track = 20.0, 0.4, 2.7, 1.5  # noqa: E741
-    delta = float(kinematic_steer_angle(np.array([psi_dot]), np.array([v]), wheelbase=l)[0])
-    assert delta > 0
-    for y, steered in ((track / 2, True), (-track / 2, True), (track / 2, False), (-track / 2, False)):
-        forward, sideways = v - psi_dot * y, psi_dot * l if steered else 0.0
-        angle = delta if steered else 0.0
-        rim = forward * np.cos(angle) + sideways * np.sin(angle)
-        back = centre_line_speed(np.array([rim]), np.array([psi_dot]), np.array([angle]), y=y, wheelbase=l)
-        assert back[0] == pytest.approx(v, rel=1e-12)
-
-
-def test_outer_wheels_run_faster_in_a_left_turn():
-    # the right rear wheel is outside: to come from the same vehicle speed its rim must run faster
-    right = centre_line_speed(np.array([20.0]), np.array([0.4]), np.zeros(1), y=-0.75, wheelbase=2.7)
-    assert right[0] < 20.0
 
 
 def test_wheel_loads():
@@ -109,9 +89,3 @@ def test_contact_ratios_of_the_thesis():
     L = np.array([1.0, 0.9, 0.8, np.sqrt(0.5), 0.6, 0.5, 0.0])
     assert slip_stiffness_ratio(L) == pytest.approx([1.0, 0.81, 0.64, 0.5, 0.36, 0.25, 0.0])
     assert friction_ratio(L) == pytest.approx([1.0, 0.972, 0.896, 0.793, 0.648, 0.5, 0.0], abs=5e-4)
-
-
-def test_stiffness_falls_before_friction():
-    """C11."""
-    L = np.linspace(0.01, 0.99, 99)
-    assert (slip_stiffness_ratio(L) < friction_ratio(L)).all()

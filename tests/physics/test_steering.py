@@ -58,6 +58,14 @@ def test_signs_about_the_kingpin():
     assert moment(F_x=-1000.0, brake=310.0) == pytest.approx(1000.0 * scrub)
 
 
+def test_a_load_turns_the_wheel_by_the_kingpin_s_lean():
+    """The axis times the moment of the forces about the point where it meets the road, small angles."""
+    axis = np.array([-np.sin(STEERING.caster), -np.sin(STEERING.inclination), 1.0])  # forward, outward, up
+    contact = [-STEERING.caster_trail, STEERING.hub_offset - 0.31 * np.sin(STEERING.inclination), 0.0]
+    for F_y, F_z in ((0.0, 4000.0), (500.0, 4000.0)):
+        assert moment(F_y=F_y, F_z=F_z) == pytest.approx(axis @ np.cross(contact, [0.0, F_y, F_z]))
+
+
 def test_steering_is_held_into_the_curve():
     left_turn = steering_torque(np.array([-250.0]), np.array([400.0]))
     assert left_turn[0] == pytest.approx(650.0 * STEERING.ratio)

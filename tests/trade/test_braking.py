@@ -49,6 +49,7 @@ def test_temperature_and_texture():
     assert math.isnan(one(drive()).bfc_20)
     measured = drive() | {"ambient_temperature": np.full(800, 283.15)}
     assert one(measured).temperature == pytest.approx(10.0)
+    assert "wetted road" in one(measured).notes[0]
     rough = one(drive(), conditions=Conditions(texture=1.6e-3))
     assert "macrotexture of 1.60 mm" in rough.reasons[0]
 

@@ -104,15 +104,15 @@ class Reader:
         return np.asarray(bits)
 
     def _traction(self, scene: Scene) -> list[FloatArray]:
-        """Torque over radius and load of each wheel; in a curve the outer ones carry more. [-]"""
+        """Torque over lever and load of each wheel; in a curve the outer ones carry more. [-]"""
         vehicle, f = self._vehicle, scene.f
         none = np.zeros(scene.size)
         loads = wheel_loads(
             f["a_kin_slow"], f["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r, h_cg=vehicle.h_cg,
             track=vehicle.track,
         )  # fmt: skip
-        spin = [vehicle.inertia(w) / vehicle.r_e(w) ** 2 * f["a_kin_slow"] for w in WHEELS]
+        spin = [vehicle.turning_inertia(w) / (vehicle.arm(w) * vehicle.r_e(w)) * f["a_kin_slow"] for w in WHEELS]
         return [
-            (scene.columns.get(f"torque_{w}", none) / vehicle.r_e(w) - spin[i]) / np.fmax(loads[i], LOAD_LEAST)
+            (scene.columns.get(f"torque_{w}", none) / vehicle.arm(w) - spin[i]) / np.fmax(loads[i], LOAD_LEAST)
             for i, w in enumerate(WHEELS)
         ]

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from aqualog.core.compiled import compiled, part
+from aqualog.core.compiled import compiled, inlined, part
 from aqualog.core.records import FloatArray
 from aqualog.detect.margin.state import (
     COVARIATES,
@@ -24,8 +24,11 @@ from aqualog.detect.margin.state import (
     FilterParams,
     Inputs,
 )  # fmt: skip
+from aqualog.physics.tyre_brush import brush_slip
 
 __all__ = ["scan"]
+
+_brush_slip = inlined(brush_slip)
 
 _NV, _NX, _NN = FULL_SPEEDS.size, len(FEATURES), NODES.size
 _LOG = np.log(FULL_SPEEDS)
@@ -37,10 +40,8 @@ _LEAST = 1e-10  # of a slip's variance
 
 @part
 def _slip(u, slope, rolling, friction):  # type: ignore[no-untyped-def]
-    """Slip of a dry axle by its traction; within ±1. [-]"""
-    F = u - rolling
-    left = max(1.0 - abs(F) / friction, 0.01)
-    return min(max(F / slope / math.sqrt(left), -1.0), 1.0)
+    """Slip of a dry wheel by the traction of its torque. [-]"""
+    return _brush_slip(u - rolling, friction, slope)
 
 
 @part
@@ -225,14 +226,15 @@ def _predict(p, t, m):  # type: ignore[no-untyped-def]
 
 @part
 def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
-    """Fill what is put out."""
+    """Fill what is put out; distances are from the car's own speed, contact from where the tables begin."""
+    contact_at, v = max(v, p.v_least), abs(v)
     m.out[0] = wet
     near, total, q, L = 0.0, 0.0, 0, 0.0
     edge = _LOG[0] - 0.5 * LOG_STEP
     limit = math.log(v + p.near)
     for i in range(_NV):
         near += w[i] * min(max((limit - edge) / LOG_STEP, 0.0), 1.0)
-        n, a = _place(v, i)
+        n, a = _place(contact_at, i)
         L += w[i] * ((1.0 - a) * t.contact[n] + a * t.contact[n + 1])
         while q < 5 and total + w[i] >= _QUANTILES[q] and w[i] > 0.0:
             m.out[2 + q] = math.exp(edge + LOG_STEP * (_QUANTILES[q] - total) / w[i]) - v
@@ -278,7 +280,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
             gain = (1.0 - wet) * g[6] / (g[6] + p.noise_M**2)
             g[5] += gain * own[i]
             g[6] *= 1.0 - gain
-    _fill(p, t, m, speed, w, wet)
+    _fill(p, t, m, v, w, wet)
 
 
 @compiled

@@ -10,7 +10,7 @@ from aqualog.core.records import FloatArray
 from aqualog.physics import tyre_brush
 from aqualog.physics.differential import differential_slip, differential_traction, speed_ratio
 
-__all__ = ["LOAD_REAR", "Road", "Split", "slip_of_traction", "split", "surface", "tangent", "traction"]
+__all__ = ["LOAD_REAR", "Road", "Split", "split", "surface", "tangent", "traction"]
 
 LOAD_FRONT, LOAD_REAR = 0.4, 0.6  # shares of the car's weight (thesis Fig. 3.4)
 
@@ -28,15 +28,6 @@ class Road:
 def traction(s: FloatArray, *, slope: float, mu_max: float) -> FloatArray:
     """Traction coefficient of the brush over slip, arrays (n,). [-]"""
     return tyre_brush.brush_force(s, np.ones_like(s), mu=mu_max, C_s=slope)
-
-
-def slip_of_traction(mu: FloatArray, *, slope: float, mu_max: float) -> FloatArray:
-    """Slip at which the brush gives a traction coefficient, |mu| <= mu_max, arrays (n,). [-]
-
-    The cubic solved: |mu| / mu_max = 1 - (1 - C |s| / 3 mu_max)^3.
-    """
-    theta = 1.0 - np.cbrt(1.0 - np.minimum(np.abs(mu) / mu_max, 1.0))
-    return np.sign(mu) * theta * tyre_brush.full_sliding_slip(np.ones_like(mu), mu=mu_max, C_s=slope)
 
 
 def tangent(mu: FloatArray, *, slope: float, mu_max: float) -> FloatArray:
@@ -69,8 +60,8 @@ def split(road: Road, force: FloatArray, nu: FloatArray | float) -> Split:
     """
     nu = np.asarray(nu, dtype=np.float64)
     mu_f, mu_r = (1.0 - nu) * force / LOAD_FRONT, nu * force / LOAD_REAR
-    s_f = slip_of_traction(mu_f, slope=road.slope, mu_max=road.mu_max)
-    s_r = slip_of_traction(mu_r, slope=road.slope, mu_max=road.mu_max)
+    s_f = tyre_brush.brush_slip(mu_f, slope=road.slope, mu=road.mu_max)
+    s_r = tyre_brush.brush_slip(mu_r, slope=road.slope, mu=road.mu_max)
     # rolling speeds over the vehicle's, times 10 to be above the speed at which slips are no longer defined
     v_f, v_r = 10.0 / (1.0 - s_f), 10.0 / (1.0 - s_r)
     mu_delta = differential_traction(mu_f, mu_r, rho=speed_ratio(v_f, v_r), beta=np.ones(1))

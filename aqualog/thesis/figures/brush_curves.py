@@ -9,11 +9,12 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.model.scenario import SURFACES
 from aqualog.physics.surface import series_slope
+from aqualog.physics.tyre_brush import brush_slip
 from aqualog.report.theme import INK, THRESHOLD
 from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import judge
 from aqualog.thesis.evidence import half_car
-from aqualog.thesis.evidence.brush import LOAD_REAR, Road, slip_of_traction, split, surface, traction
+from aqualog.thesis.evidence.brush import LOAD_REAR, Road, split, surface, traction
 from aqualog.thesis.figures.timeline import COLOURS
 from aqualog.thesis.record import Axis, Figure, Line, Panel, Sheet, Table, seconds
 
@@ -31,7 +32,7 @@ def figure_3_01() -> Figure:
     s = np.linspace(0.0, _SHOWN, 401)
     curves = {n: traction(s, slope=slopes[n], mu_max=mus[n]) for n in _NAMES}
     # where the linear part has given way: 90 % of the friction is used
-    bends = {n: float(slip_of_traction(np.array([0.9 * mus[n]]), slope=slopes[n], mu_max=mus[n])[0]) for n in _NAMES}
+    bends = {n: float(brush_slip(np.array([0.9 * mus[n]]), slope=slopes[n], mu=mus[n])[0]) for n in _NAMES}
 
     ratios = [max(slopes[a], slopes[b]) / min(slopes[a], slopes[b]) for a, b in combinations(_NAMES, 2)]
     snows = max(mus["snow"], mus["snow_on_ice"]) / min(mus["snow"], mus["snow_on_ice"]) - 1.0
@@ -80,8 +81,8 @@ def figure_3_03() -> Figure:
     s = np.linspace(0.0, 0.03, 301)
     rear = traction(s, slope=_REAR, mu_max=_MU)
     front = traction(s, slope=_FRONT, mu_max=_MU)
-    s_f = float(slip_of_traction(np.array([_POINTS[0]]), slope=_FRONT, mu_max=_MU)[0])
-    s_r = float(slip_of_traction(np.array([_POINTS[1]]), slope=_REAR, mu_max=_MU)[0])
+    s_f = float(brush_slip(np.array([_POINTS[0]]), slope=_FRONT, mu=_MU)[0])
+    s_r = float(brush_slip(np.array([_POINTS[1]]), slope=_REAR, mu=_MU)[0])
     rho = (1.0 - s_f) / (1.0 - s_r)  # v_R / v_F with v = v_x / (1 - s)
     scaled_s, scaled_mu = rho * s, rho * rear / _RATIO
 
@@ -89,8 +90,8 @@ def figure_3_03() -> Figure:
     s_delta, mu_delta = s_f - rho * s_r, _POINTS[0] - rho * _POINTS[1] / _RATIO
     chord = mu_delta / s_delta
     # the same slip on both axles: the remaining slip for an estimate of the slope
-    s_r_equal = float(slip_of_traction(np.array([_EQUAL * _RATIO]), slope=_REAR, mu_max=_MU)[0])
-    s_f_equal = float(slip_of_traction(np.array([_EQUAL]), slope=_FRONT, mu_max=_MU)[0])
+    s_r_equal = float(brush_slip(np.array([_EQUAL * _RATIO]), slope=_REAR, mu=_MU)[0])
+    s_f_equal = float(brush_slip(np.array([_EQUAL]), slope=_FRONT, mu=_MU)[0])
     rho_equal = (1.0 - s_f_equal) / (1.0 - s_r_equal)
     left = abs(s_f_equal - rho_equal * s_r_equal)
     initial_error, chord_error = abs(initial / _FRONT - 1.0), abs(chord / _FRONT - 1.0)

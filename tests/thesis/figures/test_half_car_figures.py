@@ -11,7 +11,7 @@ from aqualog.detect.slip_slope.estimator import initial_state, scan
 from aqualog.detect.slip_slope.tuning import TUNING, Params
 from aqualog.model.half_car import HalfCarRun, SurfaceChange, simulate_half_car
 from aqualog.model.scenario import Excitation
-from aqualog.physics.tyre_brush import brush_force
+from aqualog.physics.tyre_brush import brush_force, brush_slip
 from aqualog.thesis import catalogue
 from aqualog.thesis.catalogue import rows
 from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED, VERDICTS
@@ -107,7 +107,7 @@ def test_numbers_that_are_asked_for():
 @pytest.mark.parametrize(("slope", "mu_max"), [(30.0, 1.0), (10.0, 0.4)])
 def test_brush_solved_for_slip_and_its_tangent(slope, mu_max):
     mu = np.linspace(-0.9, 0.9, 37) * mu_max
-    s = brush.slip_of_traction(mu, slope=slope, mu_max=mu_max)
+    s = brush_slip(mu, slope=slope, mu=mu_max)
     assert brush_force(s, np.ones_like(s), mu=mu_max, C_s=slope) == pytest.approx(mu, abs=1e-12)
     h = 1e-7
     up, down = (brush_force(s + d, np.ones_like(s), mu=mu_max, C_s=slope) for d in (h, -h))
