@@ -188,11 +188,21 @@ def test_water_of_the_log_lies_on_the_course():
 def test_too_little_is_said():
     with pytest.raises(SignalError, match="10 s of drive"):
         prepare(changed(plain(), plain().frame.head(1000)), CAR, "a")
-    bare = changed(
-        plain(), plain().frame.select("t", "v_x") if "t" in plain().frame.columns else plain().frame.select("v_x")
-    )
+    with pytest.raises(SignalError, match="signals at 2 Hz; expected 5 Hz or more"):
+        prepare(replace(plain(), frame=plain().frame[::50], dt_ns=500_000_000), CAR, "a")
+    bare = changed(plain(), plain().frame.select("t", "v_x"))
     with pytest.raises(SignalError, match="nothing to compare"):
         prepare(bare, CAR, "a")
+
+
+@pytest.mark.parametrize(
+    ("drop", "lacks"),
+    [(("a_x",), "a_x"), (("torque_rl",), "torque_rl"), ([f"torque_{w}" for w in WHEELS], "wheel torque")],
+)
+def test_what_the_torque_lacks(drop, lacks):
+    log = plain()
+    notes = prepare(changed(log, log.frame.drop(drop)), CAR, "a").notes
+    assert any(n.startswith(f"no {lacks} in the log: the torque is") for n in notes)
 
 
 def test_a_wheel_without_values_takes_the_slip_with_it_and_says_so():
