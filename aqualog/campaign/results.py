@@ -76,10 +76,11 @@ class RunInfo:
     @property
     def events(self) -> Sequence[Mapping[str, Any]]:
         """Events as `measure` keeps them."""
-        return [e for e in self.about.get("events", ()) if self._is_own(e["start_s"], e["end_s"])]
+        found: Sequence[Mapping[str, Any]] = self.about.get("events", ())
+        return found if len(self.lanes) < 2 else [e for e in found if self._is_own(e["start_s"], e["end_s"])]
 
     def _is_own(self, start_s: float, end_s: float) -> bool:
-        if self.run.lane is None or len(self.lanes) < 2:
+        if self.run.lane is None:
             return True
         k = bisect(self.lanes, (start_s, end_s))
         far = {(a, b): max(a - end_s, start_s - b) for a, b in (*self.lanes[max(k - 1, 0) : k + 1], self.run.lane)}
