@@ -180,7 +180,8 @@ def test_files_of_a_result_are_all_there_or_none(tmp_path, monkeypatch):
     def full(_path):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(type(found), "files", lambda self, own=found.files(): {**own, "report.html": full})
+    files = {**found.files(), "report.html": full}
+    monkeypatch.setattr(type(found), "files", lambda _self: files)
     with pytest.raises(aq.AqualogError, match="No space left"):
         found.save(tmp_path / "out")
     assert not (tmp_path / "out").exists()
