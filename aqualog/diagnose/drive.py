@@ -90,7 +90,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     torque is not in the log, a frozen accelerometer; with 0.1 s: jumps of the torque. And where a wheel may float,
     unless it is judged there, too (`judges_afloat`).
     """
-    present = frozenset(s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height)
+    present = frozenset(s for s in signals.symbols if _is_measured(signals, s))
     if signals.frame.height * signals.dt < LEAST_S:
         raise SignalError(
             f"{signals.frame.height * signals.dt:.0f} s of drive", where=name, expected=f"{LEAST_S:.0f} s at the least",
@@ -204,11 +204,18 @@ def _without_lag(vehicle: Vehicle, course: Course, model: Model) -> Course:
     return replace(course, v_x=course.v_x + nudge / FOLLOW_RATE)
 
 
+def _is_measured(signals: Signals, symbol: str) -> bool:
+    """Whether a signal has values; a yaw rate that keeps one beside an a_y that does not, or that a_y, is dead."""
+    values = signals.frame[symbol].n_unique() - (signals.frame[symbol].null_count() > 0)
+    beside = {"yaw_rate": "a_y", "a_y": "yaw_rate"}.get(symbol, "")
+    return bool(values > 1 or (values == 1 and (beside not in signals.symbols or signals.frame[beside].n_unique() < 3)))
+
+
 def _silent(signals: Signals, present: frozenset[str]) -> list[str]:
-    """Signals of the log that never have a value, with the signals that depend on them."""
+    """Signals of the log that never have a value, or a dead one, with the signals that depend on them."""
     silent = [s for s in signals.symbols if s not in present]
     lost = any(s.startswith("omega_") for s in silent) or 0 < sum(f"omega_{w}" in present for w in WHEELS) < len(WHEELS)
-    out = [f"{', '.join(silent)}: no value in the whole drive"] if silent else []
+    out = [f"{', '.join(silent)}: no value, or the same one, in the whole drive"] if silent else []
     return [*out, "not all four wheel speeds: the slip of the wheels is not judged"] if lost else out
 
 

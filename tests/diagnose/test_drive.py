@@ -205,12 +205,21 @@ def test_what_the_torque_lacks(drop, lacks):
     assert any(n.startswith(f"no {lacks} in the log: the torque is") for n in notes)
 
 
+@pytest.mark.parametrize("dead", ["yaw_rate", "a_y"])
+def test_a_gyro_that_never_changes_judges_nothing(dead):
+    log = signals(sensors=NOISY)
+    assert "lateral" in prepare(log, CAR, "a").channels
+    d = prepare(changed(log, log.frame.with_columns(pl.lit(0.01).alias(dead))), CAR, "a")
+    assert "lateral" not in d.channels
+    assert any(dead in n and "the same one" in n for n in d.notes)
+
+
 def test_a_wheel_without_values_takes_the_slip_with_it_and_says_so():
     nothing = pl.Series("omega_rr", [None] * plain().frame.height, dtype=pl.Float64)
     d = prepare(changed(plain(), plain().frame.with_columns(nothing)), CAR, "a")
     assert not any(c.startswith("slip") for c in d.channels)
     assert d.notes[:2] == (
-        "omega_rr: no value in the whole drive", "not all four wheel speeds: the slip of the wheels is not judged"
+        "omega_rr: no value, or the same one, in the whole drive", "not all four wheel speeds: the slip of the wheels is not judged"
     )  # fmt: skip
 
 
