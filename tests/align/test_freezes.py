@@ -223,7 +223,7 @@ def test_a_speed_that_is_always_zero_is_no_car_that_stands(is_parked):
     signals = stop_and_go("v_x", False)
     for dead in ("v_x", "omega_rr") if is_parked else ("v_x",):
         signals[dead] = signals[dead][0], np.zeros(signals[dead][0].size)
-    assert (in_both_ways(signals).origins["torque_r"].frozen == 0) is is_parked
+    assert (in_both_ways(signals).quality.frozen_samples == 0) is is_parked
 
 
 @pytest.mark.parametrize("pieces", [1, 3, 500])
