@@ -4,13 +4,14 @@ A measured speed or torque never keeps its last digit for long. On five measured
 moving wheel is 0.9 s, of a torque 18 s. The check judges a signal only if it shows noise elsewhere. It therefore never
 reports a coarse signal at constant speed, or one that was calculated. A standing wheel, a torque of zero, and any
 torque of a standing car may keep their value for any time. A wheel whose first value lasts until a step that no wheel
-can make was not measured before that step: control units send zeros or a code before their sensors are awake. In any
-other channel only one stop that is unlike the rest of the signal is reported.
+can make was not measured before that step: control units send zeros or a code before their sensors are awake. A speed
+that keeps one value through the whole log, while another speed shows a drive, was never measured. In any other channel
+only one stop that is unlike the rest of the signal is reported.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ __all__ = [
     "StandWatch",
     "Stop",
     "Stretch",
+    "dead_speeds",
     "freeze_note",
     "longest_stop",
     "stand_watch_of",
@@ -256,14 +258,20 @@ class StandWatch:
         self._is_sound = True  # it was reached as a car stops
         self.has_moved = False
         self._found: list[Stretch] = []
+        self._first_ns = self._driving_ns = 0
+        self._low, self._high = np.inf, 0.0
 
     def push(self, t_ns: TimeArray, x: FloatArray) -> None:
         """Take samples (n,) at strictly increasing stamps, finite."""
         if not t_ns.size:
             return
         v = np.abs(x) * self._scale
+        if self._last is None:
+            self._first_ns = int(t_ns[0])
         t_last, v_last = self._last or (int(t_ns[0]), float(v[0]))
         dt = np.diff(t_ns, prepend=t_last)
+        self._driving_ns += int(dt[(v > _SPEED[1]) & (dt <= _PAUSE_NS)].sum())
+        self._low, self._high = min(self._low, float(v.min())), max(self._high, float(v.max()))
         is_sound = np.abs(np.diff(v, prepend=v_last)) <= _STOPPING * dt * 1e-9 + _SLACK
         stands = v <= _STANDING
         self.has_moved |= not bool(stands.all())
@@ -283,6 +291,22 @@ class StandWatch:
         if self._since is None or not self._is_sound or self._last is None:
             return tuple(self._found)
         return (*self._found, (self._since, self._last[0]))
+
+    def dead_beside(self, other: StandWatch) -> Freeze | None:
+        """Return the whole log if this speed keeps one value in it while the other one shows a drive."""
+        if self._last is None or other._last is None or self._low < self._high:
+            return None
+        # the drive that the other one shows must lie in the time of this one
+        is_seen = self._first_ns - _GAP_NS <= other._first_ns and other._last[0] <= self._last[0] + _GAP_NS
+        is_driving = other._driving_ns >= _SPEED[0] * 1e9
+        is_apart = self._high <= _STANDING or other._high - other._low > _SPEED[1]
+        return (self._first_ns - 1, self._last[0]) if is_seen and is_driving and is_apart else None
+
+
+def dead_speeds(watches: Mapping[str, StandWatch]) -> dict[str, Freeze]:
+    """Return the speeds that were never measured: they keep one value while another one shows a drive."""
+    pairs = ((name, watch.dead_beside(other)) for name, watch in watches.items() for other in watches.values())
+    return {name: dead for name, dead in pairs if dead is not None}
 
 
 def standing_by(watches: Iterable[StandWatch]) -> tuple[Stretch, ...]:

@@ -255,13 +255,7 @@ def _grid_step(cleaned: Sequence[Clean], rate_hz: float | None) -> int:
 
 
 def onto_grid(
-    symbol: Symbol,
-    span: Span,
-    t_ns: TimeArray,
-    x: FloatArray,
-    points: TimeArray,
-    dt_ns: int,
-    at: Placed | None,
+    symbol: Symbol, span: Span, t_ns: TimeArray, x: FloatArray, points: TimeArray, dt_ns: int, at: Placed | None
 ) -> tuple[FloatArray, bool]:
     """Put samples (n,) of a signal, at least those around the points (m,) [ns], on the grid; whether one is missing.
 

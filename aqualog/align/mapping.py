@@ -194,9 +194,7 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
         raise separate_drives(doubled, (c.file for c in channels))
     if faults:
         raise SignalError(
-            "; ".join(faults),
-            where=signal_map.path or (channels[0].file if channels else ""),
-            hint=EACH_ITS_OWN,
+            "; ".join(faults), where=signal_map.path or (channels[0].file if channels else ""), hint=EACH_ITS_OWN
         )
     _refuse_twice(found, signal_map)
     return found

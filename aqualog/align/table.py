@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from aqualog.align.clean import Clean, Cleaner, Samples, Taken, Unmeasured, corrected, span_of
-from aqualog.align.freezes import SPEEDS, standing_by, while_moving
+from aqualog.align.freezes import SPEEDS, dead_speeds, standing_by, while_moving
 from aqualog.align.grid import (
     MAX_ROWS,
     Grid,
@@ -255,8 +255,10 @@ def plan_drive(
     faults: dict[str, str] = {}
     cleaners = cleaners_of(found, signal_map, vehicle, faults=faults)
     taken = dict(take(cleaners))
-    standing = standing_by(w for name in SPEEDS if name in cleaners and (w := cleaners[name].stands) is not None)
+    speeds = {name: w for name in SPEEDS if name in cleaners and (w := cleaners[name].stands) is not None}
+    standing = standing_by(speeds.values())
     unmeasured = {name: cleaner.unmeasured() for name, cleaner in cleaners.items()}
+    unmeasured |= {name: Unmeasured((dead,)) for name, dead in dead_speeds(speeds).items()}
     for name in (n for n in unmeasured if n.startswith("torque_")):
         own = unmeasured[name]
         unmeasured[name] = own._replace(frozen=while_moving(own.frozen, standing))

@@ -162,11 +162,7 @@ def calibrate(
     else:
         balance = _balance(usable, samples, fixed, vehicle)
     fits, found, spread = balance.fits, balance.found, balance.spread
-    estimated = (
-        *balance.parameters,
-        *radii,
-        *_offsets(fits, samples, balance.levels, fixed),
-    )
+    estimated = (*balance.parameters, *radii, *_offsets(fits, samples, balance.levels, fixed))
     if not accept:
         estimated = of_kept_mass(estimated, vehicle)
     parameters = estimated if accept else keeping(estimated, vehicle)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -33,6 +34,8 @@ class RunInfo:
 
     `state` is `done`, `failed` or `to do`; `vehicle` has the run's load; `about` holds the findings of `measure`, empty
     unless done; `water_from` gives the source of the lane: `lane times`, `signal`, `labels`, `dry run`, or empty.
+    `lanes` are those of all runs on its log, in order: what is found there belongs to the lanes that it touches, else
+    to the nearest one.
     """
 
     index: int
@@ -44,6 +47,7 @@ class RunInfo:
     vehicle: Vehicle
     about: Mapping[str, Any]
     water_from: str
+    lanes: tuple[Span, ...] = ()
 
     @property
     def is_done(self) -> bool:
@@ -53,7 +57,10 @@ class RunInfo:
     @property
     def judgement(self) -> Judgement:
         """Verdict and episodes; of a run without results that it cannot be judged."""
-        return Judgement.of_document(self.about) if self.about else Judgement()
+        found = Judgement.of_document(self.about) if self.about else Judgement()
+        own = tuple(e for e in found.episodes if self._is_own(e.start_s, e.end_s))
+        verdict = "none" if found.of("aquaplaning") and all(e.kind != "aquaplaning" for e in own) else found.verdict
+        return replace(found, episodes=own, verdict=verdict)
 
     @property
     def checks(self) -> tuple[Remark, ...]:
@@ -70,7 +77,14 @@ class RunInfo:
     def events(self) -> Sequence[Mapping[str, Any]]:
         """Events as `measure` keeps them."""
         found: Sequence[Mapping[str, Any]] = self.about.get("events", ())
-        return found
+        return found if len(self.lanes) < 2 else [e for e in found if self._is_own(e["start_s"], e["end_s"])]
+
+    def _is_own(self, start_s: float, end_s: float) -> bool:
+        if self.run.lane is None:
+            return True
+        k = bisect(self.lanes, (start_s, end_s))
+        far = {(a, b): max(a - end_s, start_s - b) for a, b in (*self.lanes[max(k - 1, 0) : k + 1], self.run.lane)}
+        return far[self.run.lane] < 0.0 or min(far, key=far.__getitem__) == self.run.lane
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +178,10 @@ def load_results(
     store.look_at(done & {j.key for j in jobs})
     store.expect(j.key for j in sorted(jobs, key=lambda j: j.runs) if j.key in done)
     of_run = {index: job for job in jobs for index in job.runs}
+    of_key: dict[str, set[Span]] = {}
+    for index, run in enumerate(configured.campaign.runs):
+        of_key.setdefault(of_run[index].key, set()).update({run.lane} if run.lane is not None else ())
+    lanes = {key: tuple(sorted(own)) for key, own in of_key.items()}
     runs = []
     for index, run in enumerate(configured.campaign.runs):
         job = of_run[index]
@@ -181,7 +199,8 @@ def load_results(
         elif job.key in failed:
             state, reason = "failed", store.failure(job.key)
         name = name_of(configured.campaign, run.logs)
-        runs.append(RunInfo(index, name, run, job.key, state, reason, job.vehicle, about, _water_from(run, about)))
+        water = _water_from(run, about)
+        runs.append(RunInfo(index, name, run, job.key, state, reason, job.vehicle, about, water, lanes[job.key]))
     return CampaignData(configured, store, runs)
 
 
@@ -201,7 +220,9 @@ def _water_from(run: Run, about: Mapping[str, Any]) -> str:
 
 def _on_water(info: RunInfo, frame: pl.DataFrame, t: FloatArray, labels: tuple[Label, ...] | None) -> FloatArray:
     if info.water_from == "lane times" and info.run.lane is not None:
-        return _inside([info.run.lane], t)
+        # the water of another run is neither this one's nor dry road
+        others = ~(_inside([lane for lane in info.lanes if lane != info.run.lane], t) == 0.0)
+        return np.where(others, np.nan, _inside([info.run.lane], t))
     if info.water_from == "labels" and labels is not None:
         return _inside([(x.start_s, x.end_s) for x in labels if x.effect in AQUAPLANING], t)
     if info.water_from == "signal":

@@ -72,8 +72,7 @@ COMMANDS = {
         "Find what the simulation gets wrong on measured drives: the cause, its size and interval, and the gain.",
     ),
     "validate": Command(
-        "drives",
-        "Judge whether the simulation of a car is valid on measured drives: in one sentence, and why not.",
+        "drives", "Judge whether the simulation of a car is valid on measured drives: in one sentence, and why not."
     ),
     "evaluate": Command(
         "drives", "Compare what the detectors find with what was there: recall, latency, false alarms, confusion."

@@ -38,6 +38,7 @@ __all__ = ["Drive", "led_by", "prepare", "rolling_under", "stretches"]
 
 BESIDE_S = 1.0  # [s] before and after what is left out
 BEHIND_S = 1.0  # [s] after a stretch of water, in which the rear axle and the speed still have it
+LEAST_RATE_HZ = 5.0
 GAP_S = 0.25  # [s] longer gaps are not bridged
 A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
 A_X_MAX = 6.0  # [m/s^2]
@@ -83,17 +84,22 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     Raises
     ------
     SignalError
-        If the log has neither velocity nor four wheel speeds, or nothing to compare.
+        If the log has neither velocity nor four wheel speeds, or nothing to compare, or is too short or too slow.
 
     Left out, with a second on either side: standstill and creeping, gaps, strong cornering, braking where the brakes'
     torque is not in the log, a frozen accelerometer; with 0.1 s: jumps of the torque. And where a wheel may float,
     unless it is judged there, too (`judges_afloat`).
     """
-    present = frozenset(s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height)
+    present = frozenset(s for s in signals.symbols if _is_measured(signals, s))
     if signals.frame.height * signals.dt < LEAST_S:
         raise SignalError(
             f"{signals.frame.height * signals.dt:.0f} s of drive", where=name, expected=f"{LEAST_S:.0f} s at the least",
             hint="a longer drive",
+        )  # fmt: skip
+    if signals.dt * LEAST_RATE_HZ > 1.001:
+        raise SignalError(
+            f"signals at {1.0 / signals.dt:.3g} Hz", where=name, expected=f"{LEAST_RATE_HZ:g} Hz or more",
+            hint="the log before it was thinned; check the unit of its time and --rate",
         )  # fmt: skip
     channels = channels_of(present, vehicle)
     if not channels:
@@ -127,7 +133,9 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         torque = confirmed_torque(torque, moves, dt, 1.0 / (vehicle.mass * vehicle.r_e("fl")))
     else:
         logged = torque = needed_torque(v, vehicle, dt)
-        notes.append("no wheel torque in the log: replaced by the torque that the model needs for the measured speed")
+        torques = {f"torque_{w}" for w in vehicle.driven}
+        lacks = ", ".join(sorted({"a_x", *torques} - present)) if torques & present else "wheel torque"
+        notes.append(f"no {lacks} in the log: the torque is the one that the model needs for the measured speed")
     speed = quiet_speed(v, dt)
     t = np.arange(n, dtype=np.float64) * dt
     steer = road_wheel_angle(filled, v, vehicle, dt, most=1.2 * A_Y_MAX)
@@ -153,7 +161,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         bad |= np.gradient(speed, dt) > A_MOST
     if not torqued and "brake_pressure" not in filled:
         bad |= smooth(np.gradient(speed, dt), dt, SPEED_S) < -roll_out(v, vehicle) - ROLLS_OUT
-        notes.append("neither torque nor brakes in the log: only driving and rolling out are used")
+        notes.append("no brakes in the log: only driving and rolling out are used")
     elif torqued and "brake_pressure" not in filled:
         unlogged = "" if every_wheel else "the torque is that of one axle"
         wet = _widened(floats | _on_water(course), BESIDE_S, dt)
@@ -196,11 +204,18 @@ def _without_lag(vehicle: Vehicle, course: Course, model: Model) -> Course:
     return replace(course, v_x=course.v_x + nudge / FOLLOW_RATE)
 
 
+def _is_measured(signals: Signals, symbol: str) -> bool:
+    """Whether a signal has values; a yaw rate that keeps one beside an a_y that does not, or that a_y, is dead."""
+    values = signals.frame[symbol].n_unique() - (signals.frame[symbol].null_count() > 0)
+    beside = {"yaw_rate": "a_y", "a_y": "yaw_rate"}.get(symbol, "")
+    return bool(values > 1 or (values == 1 and (beside not in signals.symbols or signals.frame[beside].n_unique() < 3)))
+
+
 def _silent(signals: Signals, present: frozenset[str]) -> list[str]:
-    """Signals of the log that never have a value, with the signals that depend on them."""
+    """Signals of the log that never have a value, or a dead one, with the signals that depend on them."""
     silent = [s for s in signals.symbols if s not in present]
     lost = any(s.startswith("omega_") for s in silent) or 0 < sum(f"omega_{w}" in present for w in WHEELS) < len(WHEELS)
-    out = [f"{', '.join(silent)}: no value in the whole drive"] if silent else []
+    out = [f"{', '.join(silent)}: no value, or the same one, in the whole drive"] if silent else []
     return [*out, "not all four wheel speeds: the slip of the wheels is not judged"] if lost else out
 
 

@@ -114,12 +114,7 @@ def record_of(drive: Drive, found: Found, only: Collection[str] | None = None) -
 
 
 def _detector_run(
-    detector: str,
-    found: Found,
-    labels: Labels,
-    rows: dict[str, list[Span]],
-    dry: Sequence[Span],
-    wet: Sequence[Span],
+    detector: str, found: Found, labels: Labels, rows: dict[str, list[Span]], dry: Sequence[Span], wet: Sequence[Span]
 ) -> DetectorRun:
     events = [e for e in found.events if e.detector == detector]
     spans = [(e.start_s, e.end_s) for e in events]

@@ -138,11 +138,7 @@ class Start(Result):
             third = f"aqualog slip-slope {logs} {options} --traction accelerometer {own('slip_slope')}"
         else:
             third = f"aqualog convert {logs} {options} {own('drive.mf4')}"
-        return (
-            f"aqualog doctor {logs} {options}",
-            f"aqualog detect {logs} {options} {own('out')}",
-            third,
-        )
+        return (f"aqualog doctor {logs} {options}", f"aqualog detect {logs} {options} {own('out')}", third)
 
     def text(self) -> str:
         from aqualog.report.values import NOTE, cut

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ConfigError
-from aqualog.face.arguments import file_of, refuse_existing, write_whole, writing
+from aqualog.face.arguments import file_of, refuse_existing, write_together, write_whole
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
@@ -84,7 +84,7 @@ class Result(ABC):
         return json.dumps(self.document, indent=1, allow_nan=False)
 
     def save(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
-        """Write the files of this result into a folder, each whole or not at all.
+        """Write the files of this result into a folder, all of them whole or none.
 
         Parameters
         ----------
@@ -102,10 +102,7 @@ class Result(ABC):
         """
         out, files = file_of(folder, "folder"), self.files()
         refuse_existing([out / name for name in files], force=force, sources=self.sources)
-        with writing(out):
-            out.mkdir(parents=True, exist_ok=True)
-        for name, write in files.items():
-            write_whole(out / name, write)
+        write_together({out / name: write for name, write in files.items()})
         return tuple(out / name for name in files)
 
     def write_csv(self, path: PathLike, *, decimal_comma: bool = False, force: bool = False) -> tuple[Path, ...]:

@@ -115,10 +115,7 @@ class Simulation(Result):
 
     def files(self) -> Writers:
         """Return `simulation.json`, and the drive as an MDF log under the scenario's name."""
-        return {
-            f"{self.name}.mf4": lambda path: self._write(path, ".mf4"),
-            "simulation.json": self._json_file(),
-        }
+        return {f"{self.name}.mf4": lambda path: self._write(path, ".mf4"), "simulation.json": self._json_file()}
 
     def save(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
         """Write log and document into a folder; the document names the log there."""

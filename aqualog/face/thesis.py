@@ -90,13 +90,7 @@ class Figures(Result):
 
         has_values = any(c.ci95 is not None for _, c in self.findings)
         rows = [
-            (
-                c.name,
-                f.number,
-                c.verdict,
-                *((_value(c),) if has_values else ()),
-                displayed_text(c.found),
-            )
+            (c.name, f.number, c.verdict, *((_value(c),) if has_values else ()), displayed_text(c.found))
             for f, c in self.findings
         ]
         head = ("claim", "figure", "verdict", *(("value, 95 %",) if has_values else ()), "found")

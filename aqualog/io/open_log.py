@@ -230,6 +230,9 @@ def sniff(path: Path, *, any_text: bool = False) -> str:
             return name
     if any_text or _is_text(head):
         return "csv"
+    if not head.strip(b"\0"):
+        hint = "wait for the copy, or copy it again; a power cut leaves NULs, too"
+        raise LogError(f"begins with {len(head)} NUL bytes", where=str(path), expected="a log", hint=hint)
     if _is_text(head.replace(b"\0", b"")):
         line = head.count(b"\n", 0, head.index(0)) + 1
         raise LogError(

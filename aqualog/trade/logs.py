@@ -77,11 +77,7 @@ def measure_signals(signals: Signals, vehicle: Vehicle, run: Run | None, request
 
 
 def measure_logs(
-    configured: Configured,
-    request: Request,
-    *,
-    jobs: int = 1,
-    report: Report = lambda done, total, failed: None,
+    configured: Configured, request: Request, *, jobs: int = 1, report: Report = lambda done, total, failed: None
 ) -> dict[int, Measured | str]:
     """Measure every run of a campaign, by its number; a text is the reason why a log gave nothing."""
     tasks = {}

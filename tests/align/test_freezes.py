@@ -239,3 +239,19 @@ def test_when_a_car_stands(pieces):
     assert is_standing(t, watch.finish()).sum() == 100 + 39
     assert not is_standing(t[:1], watch.finish()).size
     assert StandWatch().finish() == ()
+
+
+@pytest.mark.parametrize(
+    ("value", "sway", "until", "is_dead"),
+    [(0.0, 0.0, 60.0, True), (0.0, 0.0, 40.0, False), (66.0, 5.0, 60.0, True), (66.0, 0.0, 60.0, False)],
+)
+def test_a_speed_that_never_changes_was_not_measured(value, sway, until, is_dead):
+    """Unless the drive may be even, or goes on behind the signal's end."""
+    t = np.arange(6000) * 0.01
+    others = np.round(66.0 + sway * np.sin(0.2 * t) + 0.1 * np.random.default_rng(3).standard_normal(t.size), 2)
+    signals = {f"omega_{w}": (np.round(t * S).astype(np.int64), others) for w in WHEELS}
+    end = np.searchsorted(t, until)
+    signals["omega_rl"] = signals["omega_rl"][0][:end], np.full(end, value)
+    whole = in_both_ways(signals)
+    assert ("omega_rl" not in whole.symbols) is is_dead
+    assert any("omega_rl" in n and "is frozen there" in n for n in whole.quality.notes) is is_dead

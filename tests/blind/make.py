@@ -27,16 +27,7 @@ from tests.blind.judging.answers import twins_of
 from tests.blind.metrics.plan import KNOWN
 from tests.blind.sealed import KINDS, seal
 from tests.blind.traces import detectability, residuals
-from tests.blind.world.cases import (
-    EXACT_PROGRAMMES,
-    NOISES,
-    Spec,
-    clean_pair,
-    clean_rows,
-    make_case,
-    truth,
-    world_of,
-)
+from tests.blind.world.cases import EXACT_PROGRAMMES, NOISES, Spec, clean_pair, clean_rows, make_case, truth, world_of
 from tests.blind.world.pools import COMPOUNDS, POOLS, SUITED
 from tests.blind.world.sensors import MEASURED, as_signals, measure
 from tests.blind.world.vehicles import CARS

@@ -43,11 +43,7 @@ def sample():
     """The sample drive with its features and tracks, and its vehicle."""
     car = load_vehicle(SAMPLES / "vehicle.toml")
     signals = load_signals([SAMPLES / "lane_drive.mf4"], vehicle=car)
-    return (
-        signals.array("on_water"),
-        detect_drive(signals, car),
-        np.arange(signals.frame.height) * signals.dt,
-    )
+    return (signals.array("on_water"), detect_drive(signals, car), np.arange(signals.frame.height) * signals.dt)
 
 
 def panels(titles, *, height=210, log=()):
@@ -374,11 +370,7 @@ OF_THESIS = {  # name: panels of figures, one below the other
     "slip_slope_filter": ("3.6", ("a",)),
     "contact": ("2.2", ("a", "c")),
 }
-OF_CAMPAIGN = {
-    "simulation": ("2.3", ("d",)),
-    "slip_slope": ("2.16", ("a",)),
-    "campaign_regression": ("2.17", ("a",)),
-}
+OF_CAMPAIGN = {"simulation": ("2.3", ("d",)), "slip_slope": ("2.16", ("a",)), "campaign_regression": ("2.17", ("a",))}
 
 
 def aqualog(*arguments, capture=False):

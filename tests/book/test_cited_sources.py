@@ -8,16 +8,7 @@ from functools import cache
 
 import pytest
 
-from aqualog.book.sources import (
-    KINDS,
-    citations,
-    faults,
-    linked,
-    names_without_key,
-    read,
-    register,
-    sources_page,
-)
+from aqualog.book.sources import KINDS, citations, faults, linked, names_without_key, read, register, sources_page
 from aqualog.book.topics import DOCS
 from aqualog.thesis.claims import claims
 from tests.conftest import ROOT

@@ -17,10 +17,7 @@ from aqualog.calibrate.spread import (
 from tests.calibrate.test_balance import RHO, drives
 
 
-@pytest.mark.parametrize(
-    "times",
-    [1.0, 4.0, *(pytest.param(x, marks=pytest.mark.nightly) for x in (2.0, 25.0))],
-)
+@pytest.mark.parametrize("times", [1.0, 4.0, *(pytest.param(x, marks=pytest.mark.nightly) for x in (2.0, 25.0))])
 def test_combined_intervals_cover_whatever_the_drives_differ_by(times):
     """Four drives whose variance is so many times the assumed one."""
     rng = np.random.default_rng([int(times), 5])

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -150,7 +151,19 @@ def test_runs_on_one_log_are_one_job(own):
     store = Store(own.parent / "s")
     configured = configure(own)
     assert run_batch(configured, store).made == 3
-    assert len(load_results(configured, store).done) == 4
+    data = load_results(configured, store)
+    (early,) = (r for r in data.done if r.run.lane == (1.2, 2.0))
+    late = next(r for r in data.done if r.run.lane == (2.2, 3.2))
+    assert len(data.done) == 4
+    # the water of the other run is not dry road
+    s = data.samples(early)
+    assert not (s.on_water[(s.t > 2.2) & (s.t < 3.2)] == 0.0).any()
+    assert (s.on_water[s.t > 3.6] == 0.0).all()
+    # what was found belongs to the lane that it touches, else to the nearest
+    for start, end, owners in ((1.4, 1.9, "early"), (1.9, 2.4, "both"), (0.2, 0.4, "early"), (3.5, 3.6, "late")):
+        about = {"events": [{"start_s": start, "end_s": end}]}
+        found = [len(replace(r, about=about).events) for r in (early, late)]
+        assert found == {"early": [1, 0], "late": [0, 1], "both": [1, 1]}[owners]
 
 
 def test_a_damaged_result_is_told(own):

@@ -188,11 +188,30 @@ def test_water_of_the_log_lies_on_the_course():
 def test_too_little_is_said():
     with pytest.raises(SignalError, match="10 s of drive"):
         prepare(changed(plain(), plain().frame.head(1000)), CAR, "a")
-    bare = changed(
-        plain(), plain().frame.select("t", "v_x") if "t" in plain().frame.columns else plain().frame.select("v_x")
-    )
+    with pytest.raises(SignalError, match="signals at 2 Hz; expected 5 Hz or more"):
+        prepare(replace(plain(), frame=plain().frame[::50], dt_ns=500_000_000), CAR, "a")
+    bare = changed(plain(), plain().frame.select("t", "v_x"))
     with pytest.raises(SignalError, match="nothing to compare"):
         prepare(bare, CAR, "a")
+
+
+@pytest.mark.parametrize(
+    ("drop", "lacks"),
+    [(("a_x",), "a_x"), (("torque_rl",), "torque_rl"), ([f"torque_{w}" for w in WHEELS], "wheel torque")],
+)
+def test_what_the_torque_lacks(drop, lacks):
+    log = plain()
+    notes = prepare(changed(log, log.frame.drop(drop)), CAR, "a").notes
+    assert any(n.startswith(f"no {lacks} in the log: the torque is") for n in notes)
+
+
+@pytest.mark.parametrize("dead", ["yaw_rate", "a_y"])
+def test_a_gyro_that_never_changes_judges_nothing(dead):
+    log = signals(sensors=NOISY)
+    assert "lateral" in prepare(log, CAR, "a").channels
+    d = prepare(changed(log, log.frame.with_columns(pl.lit(0.01).alias(dead))), CAR, "a")
+    assert "lateral" not in d.channels
+    assert any(dead in n and "the same one" in n for n in d.notes)
 
 
 def test_a_wheel_without_values_takes_the_slip_with_it_and_says_so():
@@ -200,7 +219,7 @@ def test_a_wheel_without_values_takes_the_slip_with_it_and_says_so():
     d = prepare(changed(plain(), plain().frame.with_columns(nothing)), CAR, "a")
     assert not any(c.startswith("slip") for c in d.channels)
     assert d.notes[:2] == (
-        "omega_rr: no value in the whole drive", "not all four wheel speeds: the slip of the wheels is not judged"
+        "omega_rr: no value, or the same one, in the whole drive", "not all four wheel speeds: the slip of the wheels is not judged"
     )  # fmt: skip
 
 

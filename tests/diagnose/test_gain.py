@@ -6,15 +6,7 @@ import numpy as np
 import pytest
 
 from aqualog.core.errors import FitError
-from aqualog.diagnose.gain import (
-    BLOCK_S,
-    HeldOut,
-    block_scores,
-    channel_gain,
-    corridor_share,
-    gain,
-    log_score_gain,
-)
+from aqualog.diagnose.gain import BLOCK_S, HeldOut, block_scores, channel_gain, corridor_share, gain, log_score_gain
 
 RNG = np.random.default_rng(11)
 UNITS = {"force_balance": "m/s^2", "kinematic": "m/s^2"}

@@ -19,19 +19,13 @@ def diagnosed(folder, seed, *of, **hidden):
     return diagnose([("log", load_signals([log], vehicle=vehicle))], vehicle, options=OPTIONS)
 
 
-@pytest.mark.parametrize(
-    ("seed", "programme", "noise"),
-    [(2, "mixed", "ou1"), (20, "stop_and_go", "white")],
-)
+@pytest.mark.parametrize(("seed", "programme", "noise"), [(2, "mixed", "ou1"), (20, "stop_and_go", "white")])
 @pytest.mark.nightly
 def test_nothing_hidden_nothing_found(tmp_path, seed, programme, noise):
     assert diagnosed(tmp_path, seed, programme, noise).verdict == "no_effect"
 
 
-@pytest.mark.parametrize(
-    ("effect", "parameter", "value"),
-    [("aero_drag", "delta_drag_area", 0.15)],
-)
+@pytest.mark.parametrize(("effect", "parameter", "value"), [("aero_drag", "delta_drag_area", 0.15)])
 @pytest.mark.nightly
 def test_what_is_hidden_is_named_with_its_size(tmp_path, effect, parameter, value):
     found = diagnosed(tmp_path, 24, **{effect: value})

@@ -174,6 +174,19 @@ def test_a_folder_in_which_nothing_can_be_written():
         assert "\n" not in str(caught.value)
 
 
+def test_files_of_a_result_are_all_there_or_none(tmp_path, monkeypatch):
+    found = aq.detect(LOG, CAR)
+
+    def full(_path):
+        raise OSError(28, "No space left on device")
+
+    files = {**found.files(), "report.html": full}
+    monkeypatch.setattr(type(found), "files", lambda _self: files)
+    with pytest.raises(aq.AqualogError, match="No space left"):
+        found.save(tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
 def test_tables_without_rows_have_their_columns():
     assert {"level", "file"} <= set(aq.doctor(LOG, CAR).tables["findings"].columns)
 

@@ -46,3 +46,10 @@ def test_a_name_that_is_no_text(tmp_path):
     assert len(hash_of([str(path)])) == len(hash_of(["good"]))
     with pytest.raises(LogError, match="its name is not UTF-8"):
         open_log(path)
+
+
+@pytest.mark.parametrize("suffix", [".mf4", ".parquet", ".csv"])
+def test_a_file_that_is_still_empty_space_is_not_taken_for_text(suffix, tmp_path):
+    (tmp_path / f"a{suffix}").write_bytes(bytes(100_000))
+    with pytest.raises(LogError, match=r"begins with \d+ NUL bytes; expected a log\. Try: wait for the copy"):
+        open_log(tmp_path / f"a{suffix}")

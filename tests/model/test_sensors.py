@@ -102,11 +102,7 @@ def test_between_grid_points_the_truth_is_linear():
 
 @pytest.mark.parametrize(
     ("channel", "shift"),
-    [
-        (Channel(latency_s=0.03), 0.03),
-        (Channel(delay_s=0.05), 0.05),
-        (Channel(latency_s=0.0123, delay_s=0.05), 0.0623),
-    ],
+    [(Channel(latency_s=0.03), 0.03), (Channel(delay_s=0.05), 0.05), (Channel(latency_s=0.0123, delay_s=0.05), 0.0623)],
 )
 def test_latency_and_delay_shift_a_ramp(channel, shift):
     t, x = seen(drive(a_x=ramp), one("a_x", channel))["a_x"]

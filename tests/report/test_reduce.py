@@ -78,10 +78,7 @@ def test_odd_signals(y):
 
 @settings(max_examples=60, deadline=None)
 @given(
-    st.integers(0, 2**32 - 1),
-    st.integers(200, 3000),
-    st.floats(0.0, 0.5),
-    st.integers(20, 200).map(lambda k: 2 * k),
+    st.integers(0, 2**32 - 1), st.integers(200, 3000), st.floats(0.0, 0.5), st.integers(20, 200).map(lambda k: 2 * k)
 )
 def test_extremes_and_order_for_any_signal(seed, n, share, points):
     rng = np.random.default_rng(seed)

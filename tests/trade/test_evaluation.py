@@ -118,8 +118,7 @@ def test_control_of_the_same_configuration_if_it_has_one():
     given = [("C", 2.0, 70.0), ("C", 2.0, 70.2), ("C", 2.5, 80.0), ("C", 2.5, 80.2), ("A", 2.0, 77.0), ("A", 2.0, 77.2),
              ("A", 3.0, 77.0), ("A", 3.0, 77.2)]  # fmt: skip
     test = evaluated(
-        [entry(*g, i) for i, g in enumerate(given)],
-        Options("straight", defaults(), ("tyre", "pressure_rear_bar"), "C"),
+        [entry(*g, i) for i, g in enumerate(given)], Options("straight", defaults(), ("tyre", "pressure_rear_bar"), "C")
     )
     own, strange = (s for s in test.sets if s.index is not None)
     assert own.index.control == pytest.approx(70.1)

@@ -168,12 +168,7 @@ def paths(fields: Sequence[Field], before: str = "") -> Iterator[tuple[str, Fiel
 
 def schema(document: Document) -> dict[str, Any]:
     """The JSON Schema, in which a field that is not in the table is an error."""
-    return {
-        "$schema": DRAFT,
-        "title": document.source,
-        "description": document.summary,
-        **_object(document.fields, ()),
-    }
+    return {"$schema": DRAFT, "title": document.source, "description": document.summary, **_object(document.fields, ())}
 
 
 def _object(fields: Sequence[Field], keys: Sequence[str]) -> dict[str, Any]:

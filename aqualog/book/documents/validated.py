@@ -2,18 +2,7 @@
 
 from __future__ import annotations
 
-from aqualog.book.documents.fields import (
-    HEAD,
-    Document,
-    count,
-    flag,
-    interval,
-    number,
-    obj,
-    rows,
-    several,
-    text,
-)
+from aqualog.book.documents.fields import HEAD, Document, count, flag, interval, number, obj, rows, several, text
 from aqualog.validate.records import ABSCISSAE, SIGNALS
 
 __all__ = ["VALIDATE"]

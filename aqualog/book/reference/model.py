@@ -37,12 +37,7 @@ verified.
 _TEXTS = (
     ("name", "text", "the file's name", "name of the car in pages and tables"),
     ("drivetrain", "text", "none", "driven axle: rwd, fwd or awd"),
-    (
-        "torque_arm",
-        "text",
-        "effective",
-        "torque over force: effective (r_e) or loaded (r_l), as (2.10) is printed",
-    ),
+    ("torque_arm", "text", "effective", "torque over force: effective (r_e) or loaded (r_l), as (2.10) is printed"),
 )
 _POLYNOMIALS = """
 A model of the tie-rod forces lets the detector `tie_rod` work; one of the steering torque serves cars without measured

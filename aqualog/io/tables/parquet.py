@@ -31,7 +31,7 @@ from aqualog.io.tables.columns import (
     split_unit,
     unique_names,
 )  # fmt: skip
-from aqualog.io.tables.csv_cells import is_clock, is_stamp
+from aqualog.io.tables.csv_cells import STYLES, is_clock, is_number, is_stamp
 from aqualog.io.tables.parquet_groups import LIBRARY_ERRORS, SoundRows, reason_of, unreadable
 from aqualog.io.write_table import METADATA_KEY
 
@@ -321,6 +321,8 @@ class ParquetReader(TableReader):
         cells = [c.strip() for c in frame[stored].drop_nulls().to_list()]
         if cells and all(map(is_stamp, cells)):
             return "stamp"
+        if cells and all(any(is_number(c, style) for style in STYLES) for c in cells):
+            self._note(f'column "{stored}" holds numbers as text and is left out: write it as numbers')
         return "clock" if cells and all(map(is_clock, cells)) else "text"
 
     def _wrapped(self, action: Callable[[], Any]) -> Any:

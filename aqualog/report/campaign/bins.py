@@ -34,11 +34,7 @@ _TITLES = {
     "pressure_front_bar": "bar f", "pressure_rear_bar": "bar r", "water_depth_mm": "mm", "water_depth_left_mm": "mm l",
     "load_front_kg": "kg f", "load_rear_kg": "kg r", "tread_depth_mm": "tread",
 }  # fmt: skip
-_WAYS = {
-    "slip_slope": "slip slope",
-    "minor_spin_down": "minor spin-downs",
-    "spin_down": "full spin-downs",
-}
+_WAYS = {"slip_slope": "slip slope", "minor_spin_down": "minor spin-downs", "spin_down": "full spin-downs"}
 _LEGEND = (
     "Slope: regression line of F_x/F_z over slip within mu (5 to 95 % of the traction driven).\n"
     "C_s/F_z, the tangent at zero slip, is larger. Model slope: the model's line over the same mu.\n"

@@ -16,16 +16,7 @@ from aqualog.thesis.claims import Check, judge, limit
 from aqualog.thesis.evidence import measures
 from aqualog.thesis.evidence.campaign import KMH, Evidence
 from aqualog.thesis.evidence.selection import Level, NotInCampaign, Selected, depth_mm, marks, pairs
-from aqualog.thesis.figures.panels import (
-    ALIGNED,
-    V_KMH,
-    Window,
-    means_line,
-    means_table,
-    shifts,
-    spread_over,
-    styles,
-)
+from aqualog.thesis.figures.panels import ALIGNED, V_KMH, Window, means_line, means_table, shifts, spread_over, styles
 from aqualog.thesis.record import Axis, Figure, Line, Panel
 
 __all__ = ["FIGURES"]

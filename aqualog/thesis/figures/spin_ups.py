@@ -16,15 +16,7 @@ from aqualog.thesis.claims import Check, judge, limit
 from aqualog.thesis.evidence import measures
 from aqualog.thesis.evidence.campaign import KMH, Evidence
 from aqualog.thesis.evidence.selection import FAMILIES, NotInCampaign, Selected, value_of
-from aqualog.thesis.figures.panels import (
-    V_KMH,
-    WHEEL_WORDS,
-    clouds,
-    means_line,
-    means_table,
-    speed_panels,
-    spread_over,
-)
+from aqualog.thesis.figures.panels import V_KMH, WHEEL_WORDS, clouds, means_line, means_table, speed_panels, spread_over
 from aqualog.thesis.record import Axis, Figure, Line, Panel
 
 __all__ = ["FIGURES"]

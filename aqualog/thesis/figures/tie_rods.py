@@ -310,10 +310,7 @@ def panels_2_23(r: DriveRun) -> tuple[Panel, ...]:
         "road-wheel angle in deg": (np.degrees(r.signal("steer_angle")), MUTED, "solid"),
         "lateral acceleration": (r.feature("a_y_slow"), INK, "solid"),
     }
-    return (
-        panel(r, "Steering and lateral acceleration", _STEER, feature_lines(r, steering)),
-        *rod_panels(r),
-    )
+    return (panel(r, "Steering and lateral acceleration", _STEER, feature_lines(r, steering)), *rod_panels(r))
 
 
 def figure_2_23() -> Figure:

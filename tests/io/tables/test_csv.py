@@ -301,11 +301,7 @@ def test_text_columns_are_no_channels(read):
 
 def test_duplicate_names(read):
     log = read("t [s],v [m/s],v [km/h],v\n0,1,2,3\n1,4,5,6\n")
-    assert [(i.path, i.name, i.unit) for i in log.infos] == [
-        ("v", "v", "m/s"),
-        ("v#2", "v", "km/h"),
-        ("v#3", "v", ""),
-    ]
+    assert [(i.path, i.name, i.unit) for i in log.infos] == [("v", "v", "m/s"), ("v#2", "v", "km/h"), ("v#3", "v", "")]
     assert log["v#2"] == [2, 5]
     assert log.noted('"v"', "several")
     with pytest.raises(SignalError, match="several channels bear this name"):

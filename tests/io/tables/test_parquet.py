@@ -122,6 +122,16 @@ def test_text_stamps(stored):
     assert channels["v"].t_ns.tolist() == [START, START + 5 * 10**8]
 
 
+def test_numbers_as_text_are_told(stored):
+    channels, faults = read(
+        stored({"t [s]": [0.0, 0.1], "v": [1, 2], "omega_fl": ["88.5", "1.088,5"], "gear": ["D", "2"]})
+    )
+    assert list(channels) == ["v"]
+    assert [n for n in faults.notes if "as text" in n] == [
+        'log.parquet: column "omega_fl" holds numbers as text and is left out: write it as numbers'
+    ]
+
+
 def test_whole_nanoseconds_are_exact(stored):
     t = [START + 1, START + 3, None]
     channels, _ = read(stored({"timestamp_ns": t, "v": [1, 2, 3]}))

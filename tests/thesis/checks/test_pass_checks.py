@@ -14,15 +14,7 @@ from aqualog.thesis.checks.slip_slope import Found
 from aqualog.thesis.checks.spins import aic_gain, rank_correlation
 from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED, combined
 from aqualog.thesis.evidence import scenes, seeds
-from aqualog.thesis.evidence.passes import (
-    SPIN_EDGES,
-    Pass,
-    PassFigures,
-    drive_pass,
-    events,
-    figures_of,
-    initial_slope,
-)
+from aqualog.thesis.evidence.passes import SPIN_EDGES, Pass, PassFigures, drive_pass, events, figures_of, initial_slope
 from aqualog.thesis.evidence.seeds import (
     PASS_SEEDS,
     Cell,
