@@ -32,6 +32,7 @@ from tests.margin.passes import own_pass
 DRIVETRAINS = ("rwd", "fwd", "awd")
 DISTANCE = (-20.0 * KMH, 100.0 * KMH)
 WATER, EDGE = (0.8, 1.4, 2.0, 2.6, 3.2, 3.7), (0.2, 0.3, 0.4, 0.5, 0.7)  # [s] behind the begin of the water
+OTHER = 3  # surface: snow, ice, gravel
 WET = 0.6  # [-] log ratio up to which water counts as such
 STOPS_AT = 0.93  # a free wheel stops at about this share of the speed at which its contact ends
 LAW_SD = 0.20  # [-] log of a tyre's full speed about a law
@@ -43,8 +44,8 @@ NEUTRAL = Emissions(
 )  # fmt: skip
 
 
-def windows(columns, vehicle, dt, wet=(1e9, 1e9)):
-    """Features and covariates (steps, 8), NaN where one is missing, of a drive; `wet` [s]: where the water is."""
+def windows(columns, vehicle, dt, *wet):
+    """Features and covariates (steps, 8), NaN where one is missing, of a drive; `wet` [s]: spans that are not dry."""
     columns = {s: x for s, x in columns.items() if not s.startswith("true_") and np.isfinite(x).any()}
     stream = FeatureStream(vehicle, dt, columns)
     f = stream.push(columns)
@@ -54,7 +55,7 @@ def windows(columns, vehicle, dt, wet=(1e9, 1e9)):
     now, rows = Filter.new(p, NEUTRAL), []
     for k in range(f["v_x_hat"].size // p.block):
         at = slice(k * p.block, (k + 1) * p.block)
-        is_wet = wet[0] - 0.1 <= k * p.dt < wet[1] + 1.0
+        is_wet = any(a - 0.1 <= k * p.dt < b + 1.0 for a, b in wet)
         now.kinds[:] = (0.0, 1.0) if is_wet else (1.0, 0.0)
         _, now = scan(p, NEUTRAL, now, Inputs(*(x[at] for x in inputs)))
         traction = np.nanmean(np.nansum(now.window[:, 5:9], axis=1)) * 0.5
@@ -66,7 +67,7 @@ def windows(columns, vehicle, dt, wet=(1e9, 1e9)):
 
 
 def of_passes(first, number):
-    """Rows of drivetrain, kind of road (0 dry, 1 water, 2 its edge), log ratio, contact share, window."""
+    """Rows of drivetrain, kind of road (0 dry, 1 water, 2 its edge, `OTHER`), log ratio, contact share, window."""
     for n in range(number):
         p = own_pass(first + n, DRIVETRAINS[n % 3], distance=DISTANCE, broad=True)
         x = windows(p.columns, p.vehicle, p.dt, p.wet)
@@ -113,12 +114,14 @@ def learn(found):
         road, ratio, x = own[:, 1], own[:, 2], own[:, 4:]
         at, rng = road == 1, np.random.default_rng(1)
         near = np.exp(-0.5 * ((ratio[at] - NODES[:, None]) / emissions.BANDWIDTH) ** 2)
-        kinds = [emissions.kinds_of(x[some, :_N], rng) for some in (road == 0, (road > 0) & (ratio < WET))]
+        wet = (road > 0) & (road < OTHER) & (ratio < WET)
+        # drag follows the speed, and what slips on snow slips in proportion to the traction
+        roads = ((road == 0, 1), (wet, _Z), (road == OTHER, _Z))
+        kinds = [emissions.kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]
         m, S, share = (np.concatenate(k) for k in zip(*kinds, strict=True))
-        m = np.concatenate([m[..., None], np.zeros((*m.shape, _Z - 1))], axis=2)
         tables[drivetrain] = Emissions(
             *emissions.laws_of(x[at, :_N], x[at, _N:], ratio[at]), near @ own[at, 3] / near.sum(axis=1), before, m, S,
-            share, np.repeat([0.0, 1.0], emissions.KINDS),
+            share, np.repeat([0.0, 1.0, 2.0], emissions.KINDS),
         )  # fmt: skip
     return tables, len(found)
 

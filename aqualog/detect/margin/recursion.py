@@ -158,10 +158,12 @@ def _place(v, i):  # type: ignore[no-untyped-def]
 
 
 @part
-def _wet(t, m):  # type: ignore[no-untyped-def]
+def _is(t, m, road):  # type: ignore[no-untyped-def]
+    """Probability of a road: 0 dry, 1 wet, 2 of another surface."""
     total = 0.0
     for k in range(m.kinds.size):
-        total += t.is_wet[k] * m.kinds[k]
+        if t.road[k] == road:
+            total += m.kinds[k]
     return total
 
 
@@ -183,7 +185,7 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
 
 @part
 def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
-    """Let the window speak: probabilities of the kinds of dry and wet road, evidence on the full speeds."""
+    """Let the window speak: probabilities of the kinds of road, evidence on the full speeds."""
     z = np.array([1.0, math.log(v / 30.0), math.asinh(traction / 0.02)])
     A, y = np.empty((_NX, _NX)), np.empty(_NX)
     score = np.empty(m.kinds.size)
@@ -211,16 +213,18 @@ def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
 @part
 def _predict(p, t, m):  # type: ignore[no-untyped-def]
     """Let the kinds change into each other over one step."""
-    wet = _wet(t, m)
+    now = (_is(t, m, 0), _is(t, m, 1), _is(t, m, 2))
     change = p.among * p.dt
-    into, out = p.to_water * p.dt * (1.0 - wet), p.to_dry * p.dt * wet
+    out = (p.dt * (p.to_water + p.to_other), p.dt * (p.to_dry + p.mistaken), p.dt * (p.to_dry + p.mistaken))
+    into = (
+        p.dt * p.to_dry * (now[1] + now[2]),
+        p.dt * (p.to_water * now[0] + p.mistaken * now[2]),
+        p.dt * (p.to_other * now[0] + p.mistaken * now[1]),
+    )
     for k in range(m.kinds.size):
-        if t.is_wet[k] > 0.0:
-            m.kinds[k] *= 1.0 - change - p.to_dry * p.dt
-            m.kinds[k] += t.kind_prior[k] * (change * wet + into)
-        else:
-            m.kinds[k] *= 1.0 - change - p.to_water * p.dt
-            m.kinds[k] += t.kind_prior[k] * (change * (1.0 - wet) + out)
+        road = int(t.road[k])
+        m.kinds[k] *= 1.0 - change - out[road]
+        m.kinds[k] += t.kind_prior[k] * (change * now[road] + into[road])
 
 
 @part
@@ -251,7 +255,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     at = int(m.samples[1]) % ROWS
     m.samples[1] += 1.0
     v = row[_V]
-    dry = 1.0 - _wet(t, m)
+    dry = _is(t, m, 0)
     old = m.window[at]
     if not math.isnan(old[_V]):
         # slower, a road counts as dry whatever lies on it
@@ -270,12 +274,12 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     if v > p.v_least:
         _judge(p, t, m, speed, traction)
     _weights(p, t, m, speed, w)
-    wet = _wet(t, m)
+    wet, dry = _is(t, m, 1), _is(t, m, 0)
     for i in range(2):
         g = m.sides[i]
         g[6] = min(g[6] + p.walk_M**2 * p.dt, p.offset_M**2)
         if known[i]:
-            gain = (1.0 - wet) * g[6] / (g[6] + p.noise_M**2)
+            gain = dry * g[6] / (g[6] + p.noise_M**2)
             g[5] += gain * own[i]
             g[6] *= 1.0 - gain
     _fill(p, t, m, speed, w, wet)
