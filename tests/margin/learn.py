@@ -2,8 +2,9 @@
 
     python -m tests.margin.learn --passes 3600 --drives 24 --keep /tmp/windows.npz
 
-Windows come from passes whose tyres are drawn by `passes.any_tyre`, and from dry drives of the tuning pool. What is
-compared with is learnt from the dry road before, by the filter itself, which is told where the water is.
+Windows come from passes whose tyres are drawn by `passes.any_tyre`, from dry drives of the tuning pool, and from drives
+on snow, ice and gravel. What is compared with is learnt from the dry road before, by the filter itself, which is told
+where the road is not dry.
 """
 
 import argparse
@@ -17,13 +18,14 @@ from aqualog.detect.detector import Scene
 from aqualog.detect.margin import emissions, state
 from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.recursion import scan
-from aqualog.detect.margin.state import FULL_SPEEDS, NODES, Emissions, Filter, Inputs
+from aqualog.detect.margin.state import FULL_SPEEDS, NODES, Emissions, Filter, FilterParams, Inputs
 from aqualog.detect.margin.watch import params
 from aqualog.features.stream import FeatureStream
-from aqualog.model.drawing import KMH, TUNING_POOL
+from aqualog.model.drawing import KMH, SCORING_POOL, TUNING_POOL, Drawing
 from aqualog.model.log import as_signals
+from aqualog.model.scenario import SURFACES, Lane, Surface
 from aqualog.model.simulate import simulate
-from aqualog.model.situations import draw
+from aqualog.model.situations import believed_vehicle, draw
 from aqualog.model.tyre import TYRES
 from aqualog.physics.hydroplaning import gallaway_speed, usf_speed
 from tests.detect.episode_study import DRY
@@ -33,6 +35,7 @@ DRIVETRAINS = ("rwd", "fwd", "awd")
 DISTANCE = (-20.0 * KMH, 100.0 * KMH)
 WATER, EDGE = (0.8, 1.4, 2.0, 2.6, 3.2, 3.7), (0.2, 0.3, 0.4, 0.5, 0.7)  # [s] behind the begin of the water
 OTHER = 3  # surface: snow, ice, gravel
+GRIPS = float(np.arcsinh(0.02 / FilterParams._field_defaults["scale_D"]))  # 2 % of slip
 WET = 0.6  # [-] log ratio up to which water counts as such
 STOPS_AT = 0.93  # a free wheel stops at about this share of the speed at which its contact ends
 LAW_SD = 0.20  # [-] log of a tyre's full speed about a law
@@ -89,6 +92,34 @@ def of_drives(first, number):
         yield from ((DRIVETRAINS.index(drawn.believed.drivetrain), 0, np.nan, np.nan, *row) for row in x[30::5])
 
 
+def other_drive(seed, drivetrain):
+    """A minute partly on snow, ice or gravel of laws drawn wider than sources have them, and from when on [s]."""
+    rng = np.random.default_rng([seed, 80])
+    pool = (SCORING_POOL, TUNING_POOL)[int(rng.integers(2))]
+    cars = [c for c in pool.vehicles if c.drivetrain == drivetrain]
+    tyre, p = pool.tyres[int(rng.integers(len(pool.tyres)))], rng.uniform(1.8e5, 2.8e5)
+    k = Drawing(rng, pool, cars[int(rng.integers(len(cars)))], tyre, p, int(rng.integers(2**31)))
+    compliance = 0.0 if rng.uniform() < 0.15 else 0.01 * 12.5 ** rng.uniform()
+    mu, rolling = 0.06 * 12.0 ** rng.uniform(), 0.05 * rng.uniform() ** 2
+    other = Surface("other", mu, compliance, rolling, rng.uniform(0.0, 70.0))
+    left, right = k.one_of(*[(other, other)] * 6, (other, SURFACES["asphalt"]), (SURFACES["asphalt"], other))
+    start, v = 0.0 if rng.uniform() < 0.45 else k.between(10.0, 20.0), k.between(42.0, 110.0) * KMH
+    speed = k.cruise(60.0, v, spread=k.between(0.02, 0.15), a_most=0.4)
+    drive = k.drive(60.0, speed, lanes=(Lane(start, 90.0, surface=left, surface_right=right),))
+    # who starts on snow takes seconds of it for dry road
+    return drive, believed_vehicle(drive, rng), start or k.between(1.0, 4.0)
+
+
+def of_others(first, number):
+    """The same of other surfaces, where wheels grip; a wheel that spins is no matter of the margin."""
+    for n in range(number):
+        drive, believed, start = other_drive(first + n, DRIVETRAINS[n % 3])
+        signals = as_signals(simulate(drive), vehicle=believed)
+        x = windows({s: signals.array(s) for s in signals.symbols}, believed, signals.dt_ns * 1e-9, (start, 90.0))
+        x = x[round(start / 0.1) + 5 :: 5]
+        yield from ((n % 3, OTHER, np.nan, np.nan, *row) for row in x if not (np.abs(row[1:3]) > GRIPS).any())
+
+
 def prior(rng, n=4000):
     """How likely each full speed is before any evidence: of tyres, pressures and depths, by three laws that disagree."""
     ends = ((0.6e-3, 6e-3), (1.8e5, 2.9e5), (1e-3, 8e-3))  # [m, Pa, m] depth, pressure, tread
@@ -128,12 +159,13 @@ def learn(found):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, default in (("passes", 3600), ("drives", 24), ("first", 100_000)):
+    for name, default in (("passes", 3600), ("drives", 24), ("others", 600), ("first", 100_000)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--keep", type=Path, default=Path("windows.npz"), help="file of windows, taken where it exists")
     a = parser.parse_args()
     if not a.keep.exists():
-        np.savez(a.keep, x=np.array([*of_passes(a.first, a.passes), *of_drives(a.first, a.drives)]))
+        found = (*of_passes(a.first, a.passes), *of_drives(a.first, a.drives), *of_others(a.first, a.others))
+        np.savez(a.keep, x=np.array(found))
     tables, n = learn(np.load(a.keep)["x"])
     note = f"Made by `python -m tests.margin.learn` from {n} windows."
     target = Path(emissions.__file__).with_name("emissions.toml")

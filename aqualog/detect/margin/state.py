@@ -57,7 +57,7 @@ class FilterParams(NamedTuple):
     walk_share: float = 0.002  # [1 / sqrt(s)]
     walk_M: float = 0.03  # [1 / sqrt(s)]
     to_water: float = 1.0 / 300.0  # [1/s]
-    to_other: float = 1.0 / 300.0  # [1/s] snow, ice, gravel
+    to_other: float = 1.0 / 3000.0  # snow, ice, gravel: rarer, and a warning in doubt does less harm than none
     to_dry: float = 1.0 / 10.0
     mistaken: float = 1.0 / 100.0  # of water to another surface and back
     among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
