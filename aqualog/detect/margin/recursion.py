@@ -127,32 +127,36 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
 
 @part
 def _score(mean, scatter, z, x, P, tail, A, y):  # type: ignore[no-untyped-def]
-    """Log likelihood of the features x by Student's law, of a mean by covariates z and a covariance; A, y scratch."""
-    logs, square = 0.0, 0.0
+    """Log likelihood of the features x by Student's law, of a mean by covariates z and a covariance; A, y scratch.
+
+    The covariance is A D A', with ones and 1 / D on the diagonal of A: no roots, and one logarithm.
+    """
+    determinant, square = 1.0, 0.0
     for i in range(_NX):
         left = x[i]
         for c in range(COVARIATES):
             left -= mean[i, c] * z[c]
-        for j in range(i + 1):
-            S = scatter[i, j] + (P[i] if i == j else 0.0)
+        S = scatter[i, i] + P[i]
+        for j in range(i):
+            AD = scatter[i, j]
             for k in range(j):
-                S -= A[i, k] * A[j, k]
-            if i == j:
-                A[i, i] = math.sqrt(max(S, 1e-9))
-            else:
-                A[i, j] = S / A[j, j]
-        for k in range(i):
-            left -= A[i, k] * y[k]
-        y[i] = left / A[i, i]
-        logs += math.log(A[i, i])
-        square += y[i] * y[i]
-    return -logs - 0.5 * (tail + _NX) * math.log1p(square / tail)
+                AD -= A[k, i] * A[j, k]
+            A[j, i] = AD
+            A[i, j] = AD * A[j, j]
+            S -= AD * A[i, j]
+            left -= A[i, j] * y[j]
+        S = max(S, 1e-9)
+        A[i, i] = 1.0 / S
+        y[i] = left
+        determinant *= S
+        square += left * left * A[i, i]
+    return -0.5 * math.log(determinant) - 0.5 * (tail + _NX) * math.log1p(square / tail)
 
 
 @part
-def _place(v, i):  # type: ignore[no-untyped-def]
+def _place(log_v, i):  # type: ignore[no-untyped-def]
     """Node below a cell of the full speed, and how far it is on the way to the next."""
-    place = min(max((_LOG[i] - math.log(v) - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
+    place = min(max((_LOG[i] - log_v - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
     n = int(place)
     return n, place - n
 
@@ -173,11 +177,11 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
     best = -1e300
     for i in range(_NV):
         beyond = max(v - FULL_SPEEDS[i], 0.0) / p.brave
-        w[i] = m.evidence[i] + math.log(t.prior[i]) - 0.5 * beyond * beyond
+        w[i] = m.evidence[i] - 0.5 * beyond * beyond
         best = max(best, w[i])
     total = 0.0
     for i in range(_NV):
-        w[i] = math.exp(w[i] - best)
+        w[i] = t.prior[i] * math.exp(w[i] - best)
         total += w[i]
     for i in range(_NV):
         w[i] /= total
@@ -204,9 +208,9 @@ def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
     nodes = np.empty(_NN)
     for n in range(_NN):
         nodes[n] = p.weight * _score(t.mean[n], t.scatter[n], z, m.x[0], P, p.tail, A, y)
-    keep = math.exp(-p.dt / p.keep_s)
+    keep, log_v = math.exp(-p.dt / p.keep_s), math.log(v)
     for i in range(_NV):
-        n, a = _place(v, i)
+        n, a = _place(log_v, i)
         m.evidence[i] = keep * m.evidence[i] + (1.0 - a) * nodes[n] + a * nodes[n + 1]
 
 
@@ -233,10 +237,10 @@ def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
     m.out[0] = wet
     near, total, q, L = 0.0, 0.0, 0, 0.0
     edge = _LOG[0] - 0.5 * LOG_STEP
-    limit = math.log(v + p.near)
+    limit, log_v = math.log(v + p.near), math.log(v)
     for i in range(_NV):
         near += w[i] * min(max((limit - edge) / LOG_STEP, 0.0), 1.0)
-        n, a = _place(v, i)
+        n, a = _place(log_v, i)
         L += w[i] * ((1.0 - a) * t.contact[n] + a * t.contact[n + 1])
         while q < 5 and total + w[i] >= _QUANTILES[q] and w[i] > 0.0:
             m.out[2 + q] = math.exp(edge + LOG_STEP * (_QUANTILES[q] - total) / w[i]) - v
