@@ -146,8 +146,8 @@ def learn(found):
         at, rng = road == 1, np.random.default_rng(1)
         near = np.exp(-0.5 * ((ratio[at] - NODES[:, None]) / emissions.BANDWIDTH) ** 2)
         wet = (road > 0) & (road < OTHER) & (ratio < WET)
-        # drag follows the speed, and what slips on snow slips in proportion to the traction
-        roads = ((road == 0, 1), (wet, _Z), (road == OTHER, _Z))
+        # what slips on snow slips in proportion to the traction; means of water that did so warned on a measured road
+        roads = ((road == 0, 1), (wet, 1), (road == OTHER, _Z))
         kinds = [emissions.kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]
         m, S, share = (np.concatenate(k) for k in zip(*kinds, strict=True))
         tables[drivetrain] = Emissions(

@@ -57,11 +57,11 @@ class FilterParams(NamedTuple):
     walk_share: float = 0.002  # [1 / sqrt(s)]
     walk_M: float = 0.03  # [1 / sqrt(s)]
     to_water: float = 1.0 / 300.0  # [1/s]
-    to_other: float = 1.0 / 3000.0  # snow, ice, gravel: rarer, and a warning in doubt does less harm than none
+    to_other: float = 1.0 / 10000.0  # [1/s] to snow, ice, gravel: in doubt a warning does less harm than none
     to_dry: float = 1.0 / 10.0
     mistaken: float = 1.0 / 100.0  # of water to another surface and back
     among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
-    start: tuple[float, float, float] = (0.96, 0.02, 0.02)  # probabilities of dry, wet and other roads
+    start: tuple[float, float, float] = (0.7, 0.15, 0.15)  # dry, wet, other: a log may begin in rain
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
     weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay
     law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
