@@ -92,29 +92,25 @@ def of_drives(first, number):
         yield from ((DRIVETRAINS.index(drawn.believed.drivetrain), 0, np.nan, np.nan, *row) for row in x[30::5])
 
 
-def other_drive(seed, drivetrain):
-    """A minute partly on snow, ice or gravel of laws drawn wider than sources have them, and from when on [s]."""
-    rng = np.random.default_rng([seed, 80])
-    pool = (SCORING_POOL, TUNING_POOL)[int(rng.integers(2))]
-    cars = [c for c in pool.vehicles if c.drivetrain == drivetrain]
-    tyre, p = pool.tyres[int(rng.integers(len(pool.tyres)))], rng.uniform(1.8e5, 2.8e5)
-    k = Drawing(rng, pool, cars[int(rng.integers(len(cars)))], tyre, p, int(rng.integers(2**31)))
-    compliance = 0.0 if rng.uniform() < 0.15 else 0.01 * 12.5 ** rng.uniform()
-    mu, rolling = 0.06 * 12.0 ** rng.uniform(), 0.05 * rng.uniform() ** 2
-    other = Surface("other", mu, compliance, rolling, rng.uniform(0.0, 70.0))
-    left, right = k.one_of(*[(other, other)] * 6, (other, SURFACES["asphalt"]), (SURFACES["asphalt"], other))
-    start, v = 0.0 if rng.uniform() < 0.45 else k.between(10.0, 20.0), k.between(42.0, 110.0) * KMH
-    speed = k.cruise(60.0, v, spread=k.between(0.02, 0.15), a_most=0.4)
-    drive = k.drive(60.0, speed, lanes=(Lane(start, 90.0, surface=left, surface_right=right),))
-    # who starts on snow takes seconds of it for dry road
-    return drive, believed_vehicle(drive, rng), start or k.between(1.0, 4.0)
-
-
 def of_others(first, number):
-    """The same of other surfaces, where wheels grip; a wheel that spins is no matter of the margin."""
+    """The same of minutes partly on snow, ice or gravel of laws drawn far wider than sources have them, where wheels
+    grip: one that spins is no matter of the margin.
+    """
     for n in range(number):
-        drive, believed, start = other_drive(first + n, DRIVETRAINS[n % 3])
+        rng = np.random.default_rng([first + n, 80])
+        pool = (SCORING_POOL, TUNING_POOL)[int(rng.integers(2))]
+        car = next(c for c in pool.vehicles if c.drivetrain == DRIVETRAINS[n % 3])
+        tyre = pool.tyres[int(rng.integers(len(pool.tyres)))]
+        k = Drawing(rng, pool, car, tyre, rng.uniform(1.8e5, 2.8e5), int(rng.integers(2**31)))
+        compliance, mu = k.one_of(0.0, *[0.01 * 12.5 ** rng.uniform()] * 6), 0.06 * 12.0 ** rng.uniform()
+        other = Surface("other", mu, compliance, 0.05 * rng.uniform() ** 2, k.between(0.0, 70.0))
+        left, right = k.one_of(*[(other, other)] * 6, (other, SURFACES["asphalt"]), (SURFACES["asphalt"], other))
+        start, v = k.one_of(0.0, k.between(10.0, 20.0)), k.between(42.0, 110.0) * KMH
+        speed = k.cruise(60.0, v, spread=k.between(0.02, 0.15), a_most=0.4)
+        drive = k.drive(60.0, speed, lanes=(Lane(start, 90.0, surface=left, surface_right=right),))
+        believed = believed_vehicle(drive, rng)
         signals = as_signals(simulate(drive), vehicle=believed)
+        start = start or k.between(1.0, 4.0)  # who starts on snow takes seconds of it for dry road
         x = windows({s: signals.array(s) for s in signals.symbols}, believed, signals.dt_ns * 1e-9, (start, 90.0))
         x = x[round(start / 0.1) + 5 :: 5]
         yield from ((n % 3, OTHER, np.nan, np.nan, *row) for row in x if not (np.abs(row[1:3]) > GRIPS).any())

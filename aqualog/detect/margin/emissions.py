@@ -110,5 +110,4 @@ def text_of(found: Mapping[str, Emissions], note: str) -> Iterator[str]:
     for drivetrain, tables in found.items():
         yield f"\n[{drivetrain}]"
         for name, x in tables._asdict().items():
-            rows = ",\n".join(_text(row) for row in x)
-            yield f"{name} = [\n{rows},\n]" if x.ndim > 1 else f"{name} = {_text(x)}"
+            yield f"{name} = {_text(x)}"
