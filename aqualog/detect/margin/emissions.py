@@ -38,7 +38,11 @@ def _file() -> dict[str, Any]:
 def emissions_of(drivetrain: str) -> Emissions:
     """Return what is learnt of cars with this drivetrain: `rwd`, `fwd` or `awd`."""
     kept = _file()[drivetrain]
-    return Emissions(*(np.array(kept[name], dtype=np.float64) for name in Emissions._fields))
+    t = Emissions(*(np.array(kept[name], dtype=np.float64) for name in Emissions._fields))
+    road = t.road.astype(int)
+    # four digits of each share: in hours of standing their sum would make probability, or lose it
+    t.kind_prior[:] /= np.bincount(road, t.kind_prior)[road]
+    return t
 
 
 def laws_of(x: FloatArray, z: FloatArray, where: FloatArray) -> tuple[FloatArray, FloatArray]:
