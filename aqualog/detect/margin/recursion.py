@@ -191,11 +191,12 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
 def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
     """Let the window speak: probabilities of the kinds of road, evidence on the full speeds."""
     z = np.array([1.0, math.log(v / 30.0), math.asinh(traction / 0.02)])
+    known = np.array([1.0, z[1], min(z[2], p.most_u)])
     A, y = np.empty((_NX, _NX)), np.empty(_NX)
     score = np.empty(m.kinds.size)
     best = -1e300
     for k in range(score.size):
-        score[k] = p.weight * _score(t.kind_mean[k], t.kind_scatter[k], z, m.x[0], m.x[1], p.tail, A, y)
+        score[k] = p.weight * _score(t.kind_mean[k], t.kind_scatter[k], known, m.x[0], m.x[1], p.tail, A, y)
         best = max(best, score[k])
     total = 0.0
     for k in range(score.size):
