@@ -67,7 +67,7 @@ class FilterParams(NamedTuple):
     law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
     law_M: float = 2.0  # [-] the same of the log variances
     keep_s: float = 0.8  # [s] memory of the evidence on the full speed
-    most_u: float = 2.8  # [-] inverse hyperbolic sine of the traction over 0.02: beyond, no drive on snow was learnt from
+    most_u: float = 2.8  # [-] asinh of the traction over 0.02: beyond, no drive on snow was learnt from
     tail: float = 6.0  # degrees of freedom: how rare what was not drawn is
 
 
