@@ -61,7 +61,7 @@ class FilterParams(NamedTuple):
     to_dry: float = 1.0 / 10.0
     mistaken: float = 1.0 / 100.0  # of water to another surface and back
     among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
-    start: tuple[float, float, float] = (0.7, 0.15, 0.15)  # dry, wet, other: a log may begin in rain
+    start: tuple[float, float, float] = (0.96, 0.02, 0.02)  # dry, wet, other; with 0.15 trailers were rain
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
     weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay
     law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
