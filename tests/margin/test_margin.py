@@ -6,8 +6,8 @@ import pytest
 from aqualog.detect.margin.emissions import emissions_of
 from aqualog.detect.margin.recursion import scan
 from aqualog.detect.margin.state import NODES, Filter, Inputs
-from aqualog.detect.margin.watch import MARGIN, params
-from aqualog.detect.stream import DriveStream, detect_drive
+from aqualog.detect.margin.watch import params
+from aqualog.detect.stream import detect_drive
 from aqualog.model.drawing import SCORING_POOL
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
@@ -87,13 +87,6 @@ def test_rain_from_the_first_metre():
     assert p[-1] > 0.9
     assert found.margin is not None
     assert np.isfinite(found.margin.warned_s)
-
-
-def test_a_log_may_begin_in_water():
-    p = own_pass(201, "rwd", distance=(2.0, 3.0))
-    cut = {s: x[round((p.wet[0] + 0.3) / p.dt) :] for s, x in p.columns.items() if not s.startswith("true_")}
-    piece = DriveStream(p.vehicle, round(p.dt * 1e9), cut, detectors=[MARGIN]).push(cut)
-    assert piece.tracks[0].active[: round(2.0 / p.dt)].any()
 
 
 def test_a_wheel_signal_that_stands_still_is_none():
