@@ -260,7 +260,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     at = int(m.samples[1]) % ROWS
     m.samples[1] += 1.0
     v = row[_V]
-    dry = 1.0 - _is(t, m, 1)
+    dry = _is(t, m, 0)
     old = m.window[at]
     if not math.isnan(old[_V]):
         # slower, a road counts as dry whatever lies on it
@@ -279,7 +279,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     if v > p.v_least:
         _judge(p, t, m, speed, traction)
     _weights(p, t, m, speed, w)
-    wet, dry = _is(t, m, 1), 1.0 - _is(t, m, 1)
+    wet, dry = _is(t, m, 1), _is(t, m, 0)
     for i in range(2):
         g = m.sides[i]
         g[6] = min(g[6] + p.walk_M**2 * p.dt, p.offset_M**2)
