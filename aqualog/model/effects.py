@@ -186,10 +186,10 @@ _PAIR = ("a_x", "a_y")
 # relations (D): an offset b of the accelerometer is a slope b / g and a force -m b against the motion, but for its slip
 _LIKE_AN_OFFSET = (("road_grade", "rolling_resistance"), ("road_grade", "brake_drag"))
 # Tolerances are given where a vehicle file or a simulator errs by more than a third of the smallest size: slip slopes
-# change by 5 % with a few degrees, the driveline turns with the wheels, a filter and half a sample, 10 ms, lie between two buses, scrub and
-# crowned roads differ, tyres follow their load by other laws, warm up and grow a little on every drive (K). Tyres of
-# one size differ by 1 % in radius, wheels by a third in inertia, slopes of the slip from 25 to 40 (K). Every tyre
-# builds up its forces over some decimetres.
+# change by 5 % with a few degrees, the driveline turns with the wheels, a filter and half a sample, 10 ms, lie
+# between two buses, scrub and crowned roads differ, tyres follow their load by other laws, warm up and grow a little
+# on every drive (K). Tyres of one size differ by 1 % in radius, wheels by a third in inertia, slopes of the slip from
+# 25 to 40 (K). Every tyre builds up its forces over some decimetres.
 _ALL = [
     Effect(
         "road_grade", "slope angle of the road [rad]", "The road climbs by {grade:.1%}.",

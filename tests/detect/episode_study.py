@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import zlib
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,14 +18,13 @@ import numpy as np
 from aqualog.detect.stream import detect_drive
 from aqualog.evaluate.drives import labels_in
 from aqualog.evaluate.labels import overlaps
-from aqualog.model.drawing import KMH, SCORING_POOL, TUNING_POOL, Drawing
+from aqualog.model.drawing import KMH, SCORING_POOL, Drawing
 from aqualog.model.log import as_signals
 from aqualog.model.scenario import Lane
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SITUATIONS, believed_vehicle, draw
 from aqualog.model.situations_made import _lane, _water
 
-POOLS = {"tuning": TUNING_POOL, "scoring": SCORING_POOL}
 DRY_GAP_S = (4.0, 12.0)  # between two lanes
 SPEED_KMH = (-15.0, 10.0)  # against that of full aquaplaning
 
@@ -84,11 +84,12 @@ def one_pass(seed: int, pool) -> Pass | None:
 
 
 def dry(name: str, seed: int, pool):
-    """Seconds and episodes of aquaplaning of a dry drive."""
+    """Seconds, episodes of aquaplaning, and warnings of the margin of a dry drive."""
     drawn = draw(name, seed, pool)
     signals = as_signals(simulate(drawn.scenario, drawn.model), vehicle=drawn.believed)
-    judgement = detect_drive(signals, drawn.believed, samples=False).judgement
-    return signals.duration_s, [(drawn.note, e) for e in judgement.of("aquaplaning")]
+    found = detect_drive(signals, drawn.believed, samples=False)
+    warned = [e for e in found.events if e.detector == "margin"]
+    return signals.duration_s, [(drawn.note, e) for e in found.judgement.of("aquaplaning")], warned
 
 
 def stop_scenario(road: str, seed: int, pool):
@@ -135,16 +136,16 @@ DRY = tuple(n for n in NUISANCES if not any(road in n for road in _OTHER_ROADS))
 
 
 def alarms(hours: float, first: int, pool, names=DRY):
-    """Seconds of dry drives, and their episodes of aquaplaning."""
-    seconds, found, seed = 0.0, [], first
+    """Seconds of dry drives, their episodes of aquaplaning, and drives in which the margin warned by situation."""
+    seconds, found, by, seed = 0.0, [], Counter(), first
     while seconds < 3600.0 * hours:
         for name in names:
-            t, wrong = dry(name, seed, pool)
-            seconds, found = seconds + t, found + wrong
+            t, wrong, warned = dry(name, seed, pool)
+            seconds, found, by[name] = seconds + t, found + wrong, by[name] + bool(warned)
             for note, e in wrong:
                 print(name, seed, note, f"{e.start_s:.1f}-{e.end_s:.1f}", e.decided_by, flush=True)
         seed += 1
-    return seconds, found
+    return seconds, found, by
 
 
 def main() -> None:
@@ -154,9 +155,8 @@ def main() -> None:
     parser.add_argument("--others", action="store_true")
     parser.add_argument("--stops", type=int, default=0)
     parser.add_argument("--first", type=int, default=1)
-    parser.add_argument("--pool", choices=tuple(POOLS), default="scoring")
     a = parser.parse_args()
-    pool, seed, done = POOLS[a.pool], a.first, []
+    pool, seed, done = SCORING_POOL, a.first, []
     while len(done) < a.passes:
         if (one := one_pass(seed, pool)) is not None:
             done.append(one)
@@ -179,8 +179,9 @@ def main() -> None:
               f"{np.sum(~np.isnan(full))}, partial in 2 s {np.sum(partial <= 2.0)} of {np.sum(~np.isnan(partial))}; false: ",
               [(note, e.start_s, e.decided_by) for _, false, _ in stops for note, e in false], flush=True)  # fmt: skip
     if a.dry_hours:
-        seconds, found = alarms(a.dry_hours, a.first, pool, NUISANCES if a.others else DRY)
-        print(f"{seconds / 3600.0:.1f} h dry, seeds from {a.first}: {len(found)} episodes of aquaplaning")
+        seconds, found, by = alarms(a.dry_hours, a.first, pool, NUISANCES if a.others else DRY)
+        print(f"{seconds / 3600.0:.1f} h dry, seeds from {a.first}: {len(found)} episodes of aquaplaning; "
+              f"the margin warned in {by.total()} drives {+by}")  # fmt: skip
 
 
 if __name__ == "__main__":

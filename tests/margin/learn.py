@@ -2,8 +2,9 @@
 
     python -m tests.margin.learn --passes 3600 --drives 24 --keep /tmp/windows.npz
 
-Windows come from passes whose tyres are drawn by `passes.any_tyre`, and from dry drives of the tuning pool. What is
-compared with is learnt from the dry road before, by the filter itself, which is told where the water is.
+Windows come from passes whose tyres are drawn by `passes.any_tyre`, from dry drives of the tuning pool, and from drives
+on snow, ice and gravel. What is compared with is learnt from the dry road before, by the filter itself, which is told
+where the road is not dry.
 """
 
 import argparse
@@ -17,13 +18,14 @@ from aqualog.detect.detector import Scene
 from aqualog.detect.margin import emissions, state
 from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.recursion import scan
-from aqualog.detect.margin.state import FULL_SPEEDS, NODES, Emissions, Filter, Inputs
+from aqualog.detect.margin.state import FULL_SPEEDS, NODES, Emissions, Filter, FilterParams, Inputs
 from aqualog.detect.margin.watch import params
 from aqualog.features.stream import FeatureStream
-from aqualog.model.drawing import KMH, TUNING_POOL
+from aqualog.model.drawing import KMH, SCORING_POOL, TUNING_POOL, Drawing
 from aqualog.model.log import as_signals
+from aqualog.model.scenario import SURFACES, Lane, Surface
 from aqualog.model.simulate import simulate
-from aqualog.model.situations import draw
+from aqualog.model.situations import believed_vehicle, draw
 from aqualog.model.tyre import TYRES
 from aqualog.physics.hydroplaning import gallaway_speed, usf_speed
 from tests.detect.episode_study import DRY
@@ -32,6 +34,8 @@ from tests.margin.passes import own_pass
 DRIVETRAINS = ("rwd", "fwd", "awd")
 DISTANCE = (-20.0 * KMH, 100.0 * KMH)
 WATER, EDGE = (0.8, 1.4, 2.0, 2.6, 3.2, 3.7), (0.2, 0.3, 0.4, 0.5, 0.7)  # [s] behind the begin of the water
+OTHER = 3  # surface: snow, ice, gravel
+GRIPS = float(np.arcsinh(0.02 / FilterParams._field_defaults["scale_D"]))  # 2 % of slip
 WET = 0.6  # [-] log ratio up to which water counts as such
 STOPS_AT = 0.93  # a free wheel stops at about this share of the speed at which its contact ends
 LAW_SD = 0.20  # [-] log of a tyre's full speed about a law
@@ -43,8 +47,8 @@ NEUTRAL = Emissions(
 )  # fmt: skip
 
 
-def windows(columns, vehicle, dt, wet=(1e9, 1e9)):
-    """Features and covariates (steps, 8), NaN where one is missing, of a drive; `wet` [s]: where the water is."""
+def windows(columns, vehicle, dt, *wet):
+    """Features and covariates (steps, 8), NaN where one is missing, of a drive; `wet` [s]: spans that are not dry."""
     columns = {s: x for s, x in columns.items() if not s.startswith("true_") and np.isfinite(x).any()}
     stream = FeatureStream(vehicle, dt, columns)
     f = stream.push(columns)
@@ -54,7 +58,7 @@ def windows(columns, vehicle, dt, wet=(1e9, 1e9)):
     now, rows = Filter.new(p, NEUTRAL), []
     for k in range(f["v_x_hat"].size // p.block):
         at = slice(k * p.block, (k + 1) * p.block)
-        is_wet = wet[0] - 0.1 <= k * p.dt < wet[1] + 1.0
+        is_wet = any(a - 0.1 <= k * p.dt < b + 1.0 for a, b in wet)
         now.kinds[:] = (0.0, 1.0) if is_wet else (1.0, 0.0)
         _, now = scan(p, NEUTRAL, now, Inputs(*(x[at] for x in inputs)))
         traction = np.nanmean(np.nansum(now.window[:, 5:9], axis=1)) * 0.5
@@ -66,7 +70,7 @@ def windows(columns, vehicle, dt, wet=(1e9, 1e9)):
 
 
 def of_passes(first, number):
-    """Rows of drivetrain, kind of road (0 dry, 1 water, 2 its edge), log ratio, contact share, window."""
+    """Rows of drivetrain, kind of road (0 dry, 1 water, 2 its edge, `OTHER`), log ratio, contact share, window."""
     for n in range(number):
         p = own_pass(first + n, DRIVETRAINS[n % 3], distance=DISTANCE, broad=True)
         x = windows(p.columns, p.vehicle, p.dt, p.wet)
@@ -86,6 +90,30 @@ def of_drives(first, number):
         signals = as_signals(simulate(drawn.scenario, drawn.model), vehicle=drawn.believed)
         x = windows({s: signals.array(s) for s in signals.symbols}, drawn.believed, signals.dt_ns * 1e-9)
         yield from ((DRIVETRAINS.index(drawn.believed.drivetrain), 0, np.nan, np.nan, *row) for row in x[30::5])
+
+
+def of_others(first, number):
+    """The same of minutes partly on snow, ice or gravel of laws drawn far wider than sources have them, where wheels
+    grip: one that spins is no matter of the margin.
+    """
+    for n in range(number):
+        rng = np.random.default_rng([first + n, 80])
+        pool = (SCORING_POOL, TUNING_POOL)[int(rng.integers(2))]
+        car = next(c for c in pool.vehicles if c.drivetrain == DRIVETRAINS[n % 3])
+        tyre = pool.tyres[int(rng.integers(len(pool.tyres)))]
+        k = Drawing(rng, pool, car, tyre, rng.uniform(1.8e5, 2.8e5), int(rng.integers(2**31)))
+        compliance, mu = k.one_of(0.0, *[0.01 * 12.5 ** rng.uniform()] * 6), 0.06 * 12.0 ** rng.uniform()
+        other = Surface("other", mu, compliance, 0.05 * rng.uniform() ** 2, k.between(0.0, 70.0))
+        left, right = k.one_of(*[(other, other)] * 6, (other, SURFACES["asphalt"]), (SURFACES["asphalt"], other))
+        start, v = k.one_of(0.0, k.between(10.0, 20.0)), k.between(42.0, 110.0) * KMH
+        speed = k.cruise(60.0, v, spread=k.between(0.02, 0.15), a_most=0.4)
+        drive = k.drive(60.0, speed, lanes=(Lane(start, 90.0, surface=left, surface_right=right),))
+        believed = believed_vehicle(drive, rng)
+        signals = as_signals(simulate(drive), vehicle=believed)
+        start = start or k.between(1.0, 4.0)  # who starts on snow takes seconds of it for dry road
+        x = windows({s: signals.array(s) for s in signals.symbols}, believed, signals.dt_ns * 1e-9, (start, 90.0))
+        x = x[round(start / 0.1) + 5 :: 5]
+        yield from ((n % 3, OTHER, np.nan, np.nan, *row) for row in x if not (np.abs(row[1:3]) > GRIPS).any())
 
 
 def prior(rng, n=4000):
@@ -113,24 +141,27 @@ def learn(found):
         road, ratio, x = own[:, 1], own[:, 2], own[:, 4:]
         at, rng = road == 1, np.random.default_rng(1)
         near = np.exp(-0.5 * ((ratio[at] - NODES[:, None]) / emissions.BANDWIDTH) ** 2)
-        kinds = [emissions.kinds_of(x[some, :_N], rng) for some in (road == 0, (road > 0) & (ratio < WET))]
+        wet = (road > 0) & (road < OTHER) & (ratio < WET)
+        # what slips on snow slips in proportion to the traction; means of water that did so warned on a measured road
+        roads = ((road == 0, 1), (wet, 1), (road == OTHER, _Z))
+        kinds = [emissions.kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]
         m, S, share = (np.concatenate(k) for k in zip(*kinds, strict=True))
-        m = np.concatenate([m[..., None], np.zeros((*m.shape, _Z - 1))], axis=2)
         tables[drivetrain] = Emissions(
             *emissions.laws_of(x[at, :_N], x[at, _N:], ratio[at]), near @ own[at, 3] / near.sum(axis=1), before, m, S,
-            share, np.repeat([0.0, 1.0], emissions.KINDS),
+            share, np.repeat([0.0, 1.0, 2.0], emissions.KINDS),
         )  # fmt: skip
     return tables, len(found)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, default in (("passes", 3600), ("drives", 24), ("first", 100_000)):
+    for name, default in (("passes", 3600), ("drives", 24), ("others", 600), ("first", 100_000)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--keep", type=Path, default=Path("windows.npz"), help="file of windows, taken where it exists")
     a = parser.parse_args()
     if not a.keep.exists():
-        np.savez(a.keep, x=np.array([*of_passes(a.first, a.passes), *of_drives(a.first, a.drives)]))
+        found = (*of_passes(a.first, a.passes), *of_drives(a.first, a.drives), *of_others(a.first, a.others))
+        np.savez(a.keep, x=np.array(found))
     tables, n = learn(np.load(a.keep)["x"])
     note = f"Made by `python -m tests.margin.learn` from {n} windows."
     target = Path(emissions.__file__).with_name("emissions.toml")

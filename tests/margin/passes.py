@@ -42,9 +42,6 @@ class Pass:
     vehicle: Vehicle
     v_full: float
     wet: tuple[float, float]
-    drivetrain: str
-    depth: float
-    note: str
     dt: float = DT
 
 
@@ -125,9 +122,7 @@ def own_pass(
     film = np.nan_to_num(signals.array("true_film_fr"))
     on = np.flatnonzero(film > 0.0) * signals.dt_ns * 1e-9
     columns = {s: signals.array(s) for s in signals.symbols}
-    note = f"{seed} {car.name}, tread {1e3 * tread:.1f} mm, {1e3 * depth:.1f} mm, {1e-5 * p:.1f} bar"
-    return Pass(columns, believed, full, (float(on[0]), float(on[-1])), car.drivetrain, depth, note,
-                signals.dt_ns * 1e-9)  # fmt: skip
+    return Pass(columns, believed, full, (float(on[0]), float(on[-1])), signals.dt_ns * 1e-9)
 
 
 def foreign_full(car, depth: float) -> float:
@@ -181,5 +176,4 @@ def foreign_pass(seed: int, drivetrain: str | None = None, *, distance: tuple[fl
     columns = {s: np.interp(t, m.t, x) for m in messages for s, x in m.columns.items()}
     way = np.interp(t, np.arange(n) * DT, rows[:, ROWS["way"]]) + base
     on = t[(way > first) & (way < last)] - t[0]
-    note = f"{seed} foreign, contact {gains[0]:.2f}, water {gains[1]:.2f}, {1e3 * depth:.1f} mm, {noise}"
-    return Pass(columns, vehicle, full, (float(on[0]), float(on[-1])), drive, depth, note)
+    return Pass(columns, vehicle, full, (float(on[0]), float(on[-1])))

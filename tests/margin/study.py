@@ -1,22 +1,15 @@
-"""How well the distance to full aquaplaning holds: passes with a known distance, and dry drives.
+"""How well the distance to full aquaplaning holds: passes with a known distance.
 
 python -m tests.margin.study --passes 4000 --first 20000
 python -m tests.margin.study --passes 1000 --first 20000 --foreign     # tests.blind.multibody: other laws
-python -m tests.margin.study --dry-hours 10 --first 20000              # false warnings of simulated dry drives
 """
 
 import argparse
-from collections import Counter
 
 import numpy as np
 
 from aqualog.detect.margin.watch import MARGIN
 from aqualog.detect.stream import DriveStream
-from aqualog.model.drawing import SCORING_POOL
-from aqualog.model.log import as_signals
-from aqualog.model.simulate import simulate
-from aqualog.model.situations import draw
-from tests.detect.episode_study import DRY
 from tests.margin.learn import DRIVETRAINS
 from tests.margin.passes import foreign_pass, own_pass
 
@@ -51,35 +44,15 @@ def lines(x, title):
         )
 
 
-def study(a):
-    make, seeds = foreign_pass if a.foreign else own_pass, range(a.first, a.first + a.passes)
-    x = np.array([outcome(make(seed, DRIVETRAINS[seed % 3])) for seed in seeds], dtype=float)
-    print("\n".join(lines(x, "foreign" if a.foreign else "own")))
-
-
-def dry(a):
-    seconds, by, seed = 0.0, Counter(), a.first
-    while seconds < 3600.0 * a.dry_hours:
-        for name in DRY:
-            drawn = draw(name, seed, SCORING_POOL)
-            signals = as_signals(simulate(drawn.scenario, drawn.model), vehicle=drawn.believed)
-            present = [s for s in signals.symbols if not s.startswith("true_") and np.isfinite(signals.array(s)).any()]
-            stream = DriveStream(drawn.believed, signals.dt_ns, present, detectors=[MARGIN])
-            events = (*stream.push({s: signals.array(s) for s in present}).events, *stream.finish())
-            seconds, by[name] = seconds + signals.duration_s * len(stream.watches), by[name] + len(events)
-            for e in events:
-                print(f"{name} {seed} {drawn.note}: {e.start_s:.1f}-{e.end_s:.1f} s, {e.peak:.2f}", flush=True)
-        seed += 1
-    print(f"{seconds / 3600.0:.2f} h dry, seeds {a.first} to {seed - 1}: {by.total()} false warnings {+by}")
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--foreign", action="store_true")
-    for name, default in (("passes", 0), ("first", 20_000), ("dry-hours", 0)):
-        parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--passes", type=int, default=600)
+    parser.add_argument("--first", type=int, default=20_000)
     a = parser.parse_args()
-    study(a) if a.passes else dry(a)
+    make, seeds = foreign_pass if a.foreign else own_pass, range(a.first, a.first + a.passes)
+    x = np.array([outcome(make(seed, DRIVETRAINS[seed % 3])) for seed in seeds], dtype=float)
+    print("\n".join(lines(x, "foreign" if a.foreign else "own")))
 
 
 if __name__ == "__main__":

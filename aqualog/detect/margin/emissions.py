@@ -21,7 +21,7 @@ __all__ = ["emissions_of", "kinds_of", "laws_of", "text_of"]
 
 VERSION = 1
 BANDWIDTH = 0.06  # [-] of the log ratio
-KINDS = 8  # of dry road, and as many of wet
+KINDS = 8  # of dry road, as many of wet, and of other surfaces
 LEAST = 1e-3  # [-] of a variance
 _N = len(FEATURES)
 _TAIL = FilterParams._field_defaults["tail"]
@@ -38,7 +38,11 @@ def _file() -> dict[str, Any]:
 def emissions_of(drivetrain: str) -> Emissions:
     """Return what is learnt of cars with this drivetrain: `rwd`, `fwd` or `awd`."""
     kept = _file()[drivetrain]
-    return Emissions(*(np.array(kept[name], dtype=np.float64) for name in Emissions._fields))
+    t = Emissions(*(np.array(kept[name], dtype=np.float64) for name in Emissions._fields))
+    road = t.road.astype(int)
+    # four digits of each share: in hours of standing their sum would make probability, or lose it
+    t.kind_prior[:] /= np.bincount(road, t.kind_prior)[road]
+    return t
 
 
 def laws_of(x: FloatArray, z: FloatArray, where: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -73,13 +77,18 @@ def laws_of(x: FloatArray, z: FloatArray, where: FloatArray) -> tuple[FloatArray
     return mean, scatter
 
 
-def kinds_of(x: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Means, covariances and shares of `KINDS` kinds of windows (n, features): a mixture of Student's laws."""
-    mean = x[rng.choice(len(x), KINDS, replace=False)]
+def kinds_of(x: FloatArray, z: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Means, covariances and shares of `KINDS` kinds of windows (n, features): a mixture of Student's laws.
+
+    The means depend on covariates z (n, 1 or more), the first of which is 1.
+    """
+    mean = np.zeros((KINDS, _N, COVARIATES))
+    mean[:, :, 0] = x[rng.choice(len(x), KINDS, replace=False)]
+    used = z.shape[1]
     S = np.tile(np.cov(x.T), (KINDS, 1, 1))
     share = np.full(KINDS, 1.0 / KINDS)
     for _ in range(150):
-        left = x[None] - mean[:, None]
+        left = x - z @ mean[:, :, :used].transpose(0, 2, 1)
         square = np.einsum("kni,kij,knj->kn", left, np.linalg.inv(S), left)
         logs = np.log(share)[:, None] - 0.5 * np.linalg.slogdet(S)[1][:, None]
         logs = logs - 0.5 * (_TAIL + _N) * np.log1p(square / _TAIL)
@@ -87,8 +96,9 @@ def kinds_of(x: FloatArray, rng: np.random.Generator) -> tuple[FloatArray, Float
         r /= r.sum(axis=0)
         w = r * (_TAIL + _N) / (_TAIL + square)
         share = r.mean(axis=1)
-        mean = (w[..., None] * x[None]).sum(axis=1) / w.sum(axis=1)[:, None]
-        left = x[None] - mean[:, None]
+        for k, form in enumerate(w[:, :, None] * z):
+            mean[k, :, :used] = np.linalg.solve(form.T @ z + LEAST * np.eye(used), form.T @ x).T
+        left = x - z @ mean[:, :, :used].transpose(0, 2, 1)
         S = np.einsum("kn,kni,knj->kij", w, left, left) / r.sum(axis=1)[:, None, None] + LEAST * np.eye(_N)
     return mean, S, share
 
@@ -104,5 +114,4 @@ def text_of(found: Mapping[str, Emissions], note: str) -> Iterator[str]:
     for drivetrain, tables in found.items():
         yield f"\n[{drivetrain}]"
         for name, x in tables._asdict().items():
-            rows = ",\n".join(_text(row) for row in x)
-            yield f"{name} = [\n{rows},\n]" if x.ndim > 1 else f"{name} = {_text(x)}"
+            yield f"{name} = {_text(x)}"

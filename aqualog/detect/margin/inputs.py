@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
+from aqualog.detect.braking import hold_on, lasting
 from aqualog.detect.detector import Scene
 from aqualog.detect.margin.state import Inputs
 from aqualog.features.smoothing import UNSET, lowpass
@@ -24,25 +24,6 @@ JUMP = 0.02  # [-] of the traction within a tenth of a second: a gear shift, whi
 HOLD = 0.3  # [s] after it
 TAU_JUMP = 0.1  # [s]
 STANDS = 0.25  # [s] a wheel speed that does not change by a bit for longer has stopped coming
-
-
-@compiled
-def _gate(samples, left, jump):  # type: ignore[no-untyped-def]
-    out = np.empty(jump.size, dtype=np.bool_)
-    for i in range(jump.size):
-        left = samples if jump[i] else max(left - 1, 0)
-        out[i] = left > 0
-    return out, left
-
-
-@compiled
-def _stands(least, last, run, x):  # type: ignore[no-untyped-def]
-    out = np.empty(x.size, dtype=np.bool_)
-    for i in range(x.size):
-        run = run + 1 if x[i] == last else 0
-        last = x[i]
-        out[i] = run >= least
-    return out, last, run
 
 
 class Reader:
@@ -87,9 +68,9 @@ class Reader:
         v = scene.f.get(f"v_line_{wheel}")
         if v is None:
             return None
-        least = max(2, round(STANDS / self._dt))
-        bits, *state = _stands(least, *self._stands[wheel], scene.columns[f"omega_{wheel}"])
-        self._stands[wheel] = (float(state[0]), int(state[1]))
+        omega, (last, run) = scene.columns[f"omega_{wheel}"], self._stands[wheel]
+        bits, run = lasting(np.diff(omega, prepend=last) == 0.0, run, least=max(2, round(STANDS / self._dt)))
+        self._stands[wheel] = (float(omega[-1]), run)
         return np.where(bits, np.nan, v)
 
     def _jumps(self, front: FloatArray, rear: FloatArray) -> BoolArray:
@@ -99,9 +80,8 @@ class Reader:
             slow, self._slow[axle] = lowpass(0.5 * x, self._slow[axle], tau=TAU_JUMP, dt=self._dt)
             with np.errstate(invalid="ignore"):
                 away |= np.abs(0.5 * x - slow) > JUMP
-        bits, left = _gate(max(1, round(HOLD / self._dt)), self._left, away)
-        self._left = int(left)
-        return np.asarray(bits)
+        away, self._left = hold_on(away, self._left, seconds=HOLD, dt=self._dt)
+        return away
 
     def _traction(self, scene: Scene) -> list[FloatArray]:
         """Torque over lever and load of each wheel; in a curve the outer ones carry more. [-]"""

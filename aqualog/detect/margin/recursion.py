@@ -128,41 +128,47 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
 
 @part
 def _score(mean, scatter, z, x, P, tail, A, y):  # type: ignore[no-untyped-def]
-    """Log likelihood of the features x by Student's law, of a mean by covariates z and a covariance; A, y scratch."""
-    logs, square = 0.0, 0.0
+    """Log likelihood of the features x by Student's law, of a mean by covariates z and a covariance; A, y scratch.
+
+    The covariance is A D A', with ones and 1 / D on the diagonal of A: no roots, and one logarithm.
+    """
+    determinant, square = 1.0, 0.0
     for i in range(_NX):
         left = x[i]
         for c in range(COVARIATES):
             left -= mean[i, c] * z[c]
-        for j in range(i + 1):
-            S = scatter[i, j] + (P[i] if i == j else 0.0)
+        S = scatter[i, i] + P[i]
+        for j in range(i):
+            AD = scatter[i, j]
             for k in range(j):
-                S -= A[i, k] * A[j, k]
-            if i == j:
-                A[i, i] = math.sqrt(max(S, 1e-9))
-            else:
-                A[i, j] = S / A[j, j]
-        for k in range(i):
-            left -= A[i, k] * y[k]
-        y[i] = left / A[i, i]
-        logs += math.log(A[i, i])
-        square += y[i] * y[i]
-    return -logs - 0.5 * (tail + _NX) * math.log1p(square / tail)
+                AD -= A[k, i] * A[j, k]
+            A[j, i] = AD
+            A[i, j] = AD * A[j, j]
+            S -= AD * A[i, j]
+            left -= A[i, j] * y[j]
+        S = max(S, 1e-9)
+        A[i, i] = 1.0 / S
+        y[i] = left
+        determinant *= S
+        square += left * left * A[i, i]
+    return -0.5 * math.log(determinant) - 0.5 * (tail + _NX) * math.log1p(square / tail)
 
 
 @part
-def _place(v, i):  # type: ignore[no-untyped-def]
+def _place(log_v, i):  # type: ignore[no-untyped-def]
     """Node below a cell of the full speed, and how far it is on the way to the next."""
-    place = min(max((_LOG[i] - math.log(v) - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
+    place = min(max((_LOG[i] - log_v - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
     n = int(place)
     return n, place - n
 
 
 @part
-def _wet(t, m):  # type: ignore[no-untyped-def]
+def _is(t, m, road):  # type: ignore[no-untyped-def]
+    """Probability of a road: 0 dry, 1 wet, 2 of another surface."""
     total = 0.0
     for k in range(m.kinds.size):
-        total += t.is_wet[k] * m.kinds[k]
+        if t.road[k] == road:
+            total += m.kinds[k]
     return total
 
 
@@ -172,11 +178,11 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
     best = -1e300
     for i in range(_NV):
         beyond = max(v - FULL_SPEEDS[i], 0.0) / p.brave
-        w[i] = m.evidence[i] + math.log(t.prior[i]) - 0.5 * beyond * beyond
+        w[i] = m.evidence[i] - 0.5 * beyond * beyond
         best = max(best, w[i])
     total = 0.0
     for i in range(_NV):
-        w[i] = math.exp(w[i] - best)
+        w[i] = t.prior[i] * math.exp(w[i] - best)
         total += w[i]
     for i in range(_NV):
         w[i] /= total
@@ -184,13 +190,14 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
 
 @part
 def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
-    """Let the window speak: probabilities of the kinds of dry and wet road, evidence on the full speeds."""
+    """Let the window speak: probabilities of the kinds of road, evidence on the full speeds."""
     z = np.array([1.0, math.log(v / 30.0), math.asinh(traction / 0.02)])
+    known = np.array([1.0, z[1], min(z[2], p.most_u)])
     A, y = np.empty((_NX, _NX)), np.empty(_NX)
     score = np.empty(m.kinds.size)
     best = -1e300
     for k in range(score.size):
-        score[k] = p.weight * _score(t.kind_mean[k], t.kind_scatter[k], z, m.x[0], m.x[1], p.tail, A, y)
+        score[k] = p.weight * _score(t.kind_mean[k], t.kind_scatter[k], known, m.x[0], m.x[1], p.tail, A, y)
         best = max(best, score[k])
     total = 0.0
     for k in range(score.size):
@@ -203,38 +210,40 @@ def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
     nodes = np.empty(_NN)
     for n in range(_NN):
         nodes[n] = p.weight * _score(t.mean[n], t.scatter[n], z, m.x[0], P, p.tail, A, y)
-    keep = math.exp(-p.dt / p.keep_s)
+    keep, log_v = math.exp(-p.dt / p.keep_s), math.log(v)
     for i in range(_NV):
-        n, a = _place(v, i)
+        n, a = _place(log_v, i)
         m.evidence[i] = keep * m.evidence[i] + (1.0 - a) * nodes[n] + a * nodes[n + 1]
 
 
 @part
 def _predict(p, t, m):  # type: ignore[no-untyped-def]
     """Let the kinds change into each other over one step."""
-    wet = _wet(t, m)
+    now = (_is(t, m, 0), _is(t, m, 1), _is(t, m, 2))
     change = p.among * p.dt
-    into, out = p.to_water * p.dt * (1.0 - wet), p.to_dry * p.dt * wet
+    out = (p.dt * (p.to_water + p.to_other), p.dt * (p.to_dry + p.mistaken), p.dt * (p.to_dry + p.mistaken))
+    into = (
+        p.dt * p.to_dry * (now[1] + now[2]),
+        p.dt * (p.to_water * now[0] + p.mistaken * now[2]),
+        p.dt * (p.to_other * now[0] + p.mistaken * now[1]),
+    )
     for k in range(m.kinds.size):
-        if t.is_wet[k] > 0.0:
-            m.kinds[k] *= 1.0 - change - p.to_dry * p.dt
-            m.kinds[k] += t.kind_prior[k] * (change * wet + into)
-        else:
-            m.kinds[k] *= 1.0 - change - p.to_water * p.dt
-            m.kinds[k] += t.kind_prior[k] * (change * (1.0 - wet) + out)
+        road = int(t.road[k])
+        m.kinds[k] *= 1.0 - change - out[road]
+        m.kinds[k] += t.kind_prior[k] * (change * now[road] + into[road])
 
 
 @part
 def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
     """Fill what is put out; distances are from the car's own speed, contact from where the tables begin."""
-    contact_at, v = max(v, p.v_least), abs(v)
+    log_at, v = math.log(max(v, p.v_least)), abs(v)
     m.out[0] = wet
     near, total, q, L = 0.0, 0.0, 0, 0.0
     edge = _LOG[0] - 0.5 * LOG_STEP
     limit = math.log(v + p.near)
     for i in range(_NV):
         near += w[i] * min(max((limit - edge) / LOG_STEP, 0.0), 1.0)
-        n, a = _place(contact_at, i)
+        n, a = _place(log_at, i)
         L += w[i] * ((1.0 - a) * t.contact[n] + a * t.contact[n + 1])
         while q < 5 and total + w[i] >= _QUANTILES[q] and w[i] > 0.0:
             m.out[2 + q] = math.exp(edge + LOG_STEP * (_QUANTILES[q] - total) / w[i]) - v
@@ -253,7 +262,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     at = int(m.samples[1]) % ROWS
     m.samples[1] += 1.0
     v = row[_V]
-    dry = 1.0 - _wet(t, m)
+    dry = _is(t, m, 0)
     old = m.window[at]
     if not math.isnan(old[_V]):
         # slower, a road counts as dry whatever lies on it
@@ -272,12 +281,12 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     if v > p.v_least:
         _judge(p, t, m, speed, traction)
     _weights(p, t, m, speed, w)
-    wet = _wet(t, m)
+    wet, dry = _is(t, m, 1), _is(t, m, 0)
     for i in range(2):
         g = m.sides[i]
         g[6] = min(g[6] + p.walk_M**2 * p.dt, p.offset_M**2)
         if known[i]:
-            gain = (1.0 - wet) * g[6] / (g[6] + p.noise_M**2)
+            gain = dry * g[6] / (g[6] + p.noise_M**2)
             g[5] += gain * own[i]
             g[6] *= 1.0 - gain
     _fill(p, t, m, v, w, wet)

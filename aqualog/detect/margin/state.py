@@ -57,14 +57,17 @@ class FilterParams(NamedTuple):
     walk_share: float = 0.002  # [1 / sqrt(s)]
     walk_M: float = 0.03  # [1 / sqrt(s)]
     to_water: float = 1.0 / 300.0  # [1/s]
+    to_other: float = 1.0 / 10000.0  # [1/s] to snow, ice, gravel: in doubt a warning does less harm than none
     to_dry: float = 1.0 / 10.0
+    mistaken: float = 1.0 / 100.0  # of water to another surface and back
     among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
-    start_water: float = 0.02  # probability of water at the start
+    start: tuple[float, float, float] = (0.96, 0.02, 0.02)  # dry, wet, other; with 0.15 trailers were rain
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
     weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay
     law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
     law_M: float = 2.0  # [-] the same of the log variances
     keep_s: float = 0.8  # [s] memory of the evidence on the full speed
+    most_u: float = 2.8  # [-] asinh of the traction over 0.02: beyond, no drive on snow was learnt from
     tail: float = 6.0  # degrees of freedom: how rare what was not drawn is
 
 
@@ -89,8 +92,8 @@ class Inputs(NamedTuple):
 class Emissions(NamedTuple):
     """Mean by covariates (nodes, features, covariates) and covariance (nodes, features, features) at each distance.
 
-    `contact` (nodes,) [-] of the front axle; `prior` (full speeds,). `kind_` the same of kinds of road, dry and wet:
-    their shares sum to 1 among the dry and among the wet; `is_wet` 0 or 1.
+    `contact` (nodes,) [-] of the front axle; `prior` (full speeds,). `kind_` the same of kinds of road. `road`: 0 dry,
+    1 wet, 2 snow, ice or gravel; the shares of each sum to 1.
     """
 
     mean: FloatArray
@@ -100,7 +103,7 @@ class Emissions(NamedTuple):
     kind_mean: FloatArray
     kind_scatter: FloatArray
     kind_prior: FloatArray
-    is_wet: FloatArray
+    road: FloatArray
 
 
 class Filter(NamedTuple):
@@ -113,7 +116,7 @@ class Filter(NamedTuple):
     """
 
     evidence: FloatArray  # (full speeds,) log
-    kinds: FloatArray  # (kinds,) probabilities of kinds of dry and wet road
+    kinds: FloatArray  # (kinds,) probabilities of kinds of road
     R: FloatArray
     sides: FloatArray
     window: FloatArray  # (ROWS, COLUMNS)
@@ -128,7 +131,7 @@ class Filter(NamedTuple):
         side = np.array([0.0, 0.0, p.offset_D**2, 0.0, p.share_D**2, p.shake, p.offset_M**2])
         return Filter(
             evidence=np.zeros(FULL_SPEEDS.size),
-            kinds=t.kind_prior * np.where(t.is_wet > 0.0, p.start_water, 1.0 - p.start_water),
+            kinds=t.kind_prior * np.array(p.start)[t.road.astype(int)],
             R=np.array([0.0, 0.0, p.offset_R**2, 0.0, p.share_a**2]),
             sides=np.stack([side, side]),
             window=np.full((ROWS, COLUMNS), np.nan),
