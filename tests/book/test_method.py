@@ -75,10 +75,8 @@ def rows():
     yield "spin_down", f"| deep slip | a quarter of the speed for {s.t_deep:g} s |"
     yield "spin_down", f"| least speed | {s.v_min:g} m/s |"
     yield "spin_up", f"| threshold `spin_up` | {DEFAULT.spin_up:g} m/s |"
-    yield (
-        "spin_up",
-        f"| traction limit | {spin.MU_SPIN_UP:g} | an event may begin only below it (thesis 2.1), for {spin.HELD_S:g} s |",
-    )
+    yield "spin_up", f"| traction limit | {spin.MU_SPIN_UP:g} | an event may begin only below it"
+    yield "spin_up", f"(thesis 2.1), for {spin.HELD_S:g} s |"
     yield "spin_up", f"| drift | {spin.SIDEWAYS:g} m/s² |"
     yield "spin_up", f"traction below {spin.MU_FULL:g} for most of the event |"
     yield "minor_spin_down", f"| threshold `minor_spin_down` | {DEFAULT.minor_spin_down:.1f} (m/s²)² |"
@@ -135,10 +133,7 @@ def rows():
     yield "slip_slope_filter", f"| `zeta`, `h` | {TUNING.zeta:g}, {TUNING.h:g} s |"
     yield "slip_slope_filter", f"| `tau_settle`, `rest` | {TUNING.tau_settle:g} s, {TUNING.rest:g} |"
     yield "slip_slope_filter", f"| `sd_k_reset` | {TUNING.sd_k_reset:g} |"
-    yield (
-        "slip_slope_filter",
-        f"| `sd_k`, `sd_beta`, `sd_delta` | {TUNING.sd_k:g}, {TUNING.sd_beta:g}, {TUNING.sd_delta:g} |",
-    )
+    yield "slip_slope_filter", f"`sd_beta`, `sd_delta` | {TUNING.sd_k:g}, {TUNING.sd_beta:g}, {TUNING.sd_delta:g} |"
     yield "slip_slope_filter", f"| {TUNING.mu_min:g}, {TUNING.mu_max:g}, {TUNING.s_min:g}, {TUNING.s_max:g} |"
     yield "slip_slope_filter", f"| {TUNING.tau_window:g} s, {TUNING.told_k:g}, {TUNING.told_beta:g} |"
     yield "slip_slope_filter", f"| acceleration along, across | below {a.a_x_max:g}, {a.a_y_max:g} m/s² |"
@@ -147,10 +142,8 @@ def rows():
     yield "slip_slope_filter", f"below {a.mu_rate_max:g} per second, and {watch.AFTER_JUMP:g} s after"
     yield "slip_slope_filter", f"| low-pass on slip and traction alike | {watch.TAU_SMOOTH:g} s |"
     yield "calibration", f"| window, block | {design.WINDOW_S:g} s, {design.BLOCK_S:g} s |"
-    yield (
-        "calibration",
-        f"above {design.V_MIN:g} m/s, below {design.A_Y_MAX:g} m/s² lateral and {design.YAW_MAX:g} rad/s",
-    )
+    yield "calibration", f"above {design.V_MIN:g} m/s, below {design.A_Y_MAX:g} m/s² lateral"
+    yield "calibration", f"m/s² lateral and {design.YAW_MAX:g} rad/s"
     yield "campaign_regression", f"| settling | {results.SETTLING_S:g} s |"
     yield "full_aquaplaning", f"| draws | {full_speed.DRAWS} |"
     yield "full_aquaplaning", f"| extrapolation | noted beyond {full_speed.EXTRAPOLATED:g} times"

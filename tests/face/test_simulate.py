@@ -10,22 +10,10 @@ from aqualog.config.scenario import load_scenario
 from aqualog.model import campaign as programmes
 from aqualog.model.campaign import CampaignOutcome
 from tests.both_ways import check_shown, command
-from tests.conftest import ROOT
+from tests.cli.test_simulate import CAR
+from tests.cli.test_simulate import SCENARIO as ONE_LANE
 
-CAR = ROOT / "sample_logs" / "vehicle.toml"
-SCENARIO = f"""vehicle = "{CAR}"
-speed_kmh = 110
-duration_s = 3
-sample_rate_hz = 100
-[[lane]]
-start_s = 0.8
-end_s = 2.0
-water_depth_mm = 1.3
-[[lane]]
-start_s = 8.0
-end_s = 9.0
-water_depth_mm = 2
-"""
+SCENARIO = ONE_LANE + "[[lane]]\nstart_s = 8.0\nend_s = 9.0\nwater_depth_mm = 2\n"
 
 
 @pytest.fixture(scope="module")
