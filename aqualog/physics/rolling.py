@@ -38,8 +38,8 @@ def effective_radius(r_e: FloatArray, v: FloatArray, *, growth: float) -> FloatA
 def pressed_radius(F_z: FloatArray, *, F_z_ref: float, loss: float) -> FloatArray:
     """Effective rolling radius over that at the reference load, 1 - loss (F_z / F_z_ref - 1). [-]
 
-    The belt keeps its length, so that little of a deflection reaches the rolling radius. MF6.1 with B 8.4, D 0.27,
-    F 0.07 and a deflection of 20 mm has a loss of 0.0066 around its nominal load. Loss 0 gives 1 to the last bit.
+    The belt keeps its length, so that little of a deflection reaches the rolling radius. The law [pacejka2012] with B
+    8.4, D 0.27, F 0.07 and a deflection of 20 mm loses 0.0066 around its nominal load. Loss 0 gives 1 to the last bit.
 
     Source: the law of [pacejka2012], its tangent.
     """

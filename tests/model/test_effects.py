@@ -139,7 +139,6 @@ def test_no_name_is_taken_twice():
 
 
 def test_a_wheel_that_carries_more_rolls_on_less_radius():
-    """In a slalom the outer wheels turn faster for it; the slips hardly change."""
     steering = Steering(slalom_angle(SEDAN, TYRES["worn_summer"], 25.0, 3.0), 4.0)
     setup = assemble(Scenario(SEDAN, duration_s=6.0, speed=((0.0, 25.0), (6.0, 25.0)), steering=steering))
     pressed = setup._replace(plant=setup.plant._replace(radius_loss=np.full(4, 0.02)))

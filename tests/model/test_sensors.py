@@ -110,9 +110,8 @@ def test_latency_and_delay_shift_a_ramp(channel, shift):
 
 
 def test_an_antenna_moves_with_the_pitching_body():
-    truth = drive(a_x=lambda t: 0.5 * t, v_x=wave)
-    t, x = seen(truth, one("v_x", Channel(pitching=0.01)))["v_x"]
-    np.testing.assert_allclose(x, np.interp(t, truth.t, truth.columns["v_x"]) + 0.005, rtol=0.0, atol=1e-12)
+    _, x = seen(drive(a_x=lambda t: 0.5 * t, v_x=lambda t: 0.0 * t), one("v_x", Channel(pitching=0.01)))["v_x"]
+    np.testing.assert_allclose(x, 0.005, rtol=0.0, atol=1e-12)
 
 
 def test_lag_of_a_ramp_and_of_a_step():
