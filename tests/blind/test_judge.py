@@ -96,9 +96,7 @@ def form(mechanism, *over, probability=0.9):
 
 
 def test_unknown_form_needs_mechanism_and_coordinate():
-    hidden = truth(
-        "unknown", unknown={"mechanism": "force", "depends_on": ["v_x"], "kind": "hump", "held_back": True}
-    )  # fmt: skip
+    hidden = truth("unknown", unknown={"mechanism": "force", "depends_on": ["v_x"], "kind": "hump", "held_back": True})
     right = judged(document("unexplained", unexplained=[form("force on the car", "speed")]), hidden)
     second = judged(
         document("unexplained", unexplained=[form("force", "t", probability=0.2), form("force", "v_x")]), hidden

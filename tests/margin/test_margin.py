@@ -22,6 +22,7 @@ from aqualog.model.situations import draw
 from aqualog.physics.tyre_brush import brush_force
 from aqualog.report.drive.document import document
 from aqualog.report.drive.panels import drive_rows
+from aqualog.report.drive.report import drive_report
 from tests.drives import CAR, drive, lane
 from tests.margin.learn import DRIVETRAINS, windows
 from tests.margin.passes import own_pass
@@ -84,6 +85,8 @@ def test_document_and_page(wet):
     assert found["least_kmh"] == pytest.approx(KMH * wet.margin.least, rel=1e-6)
     row = next(r for r in drive_rows(wet) if r.title == "Distance to full aquaplaning")
     assert [line.label for line in row.lines] == ["95 %", "75 %", "median", "25 %", "5 %"]
+    shaded = drive_report(wet, is_drawn=True).islands["drive-data"]["shaded"]
+    assert all(x == shaded[0] for x, e in zip(shaded, wet.events, strict=True) if e.detector == "margin")
 
 
 def test_rain_from_the_first_metre():

@@ -325,7 +325,11 @@ def _drawn(result: DriveResult, events: Table) -> tuple[list[Section], dict[str,
     """The section that the page's script draws, if there is anything to draw, and all that the script needs."""
     rows = drive_rows(result)
     plan = make_plan(by_importance(result.events), result.signals.frame.height, result.signals.dt)
-    wet = {i: e for e in result.judgement.of("aquaplaning") for i in e.events}
+    episodes = result.judgement.of("aquaplaning")
+    wet = {i: e for e in episodes for i in e.events}
+    # a warning is no evidence of an episode, but of its water
+    warned = [(i, w) for i, w in enumerate(result.events) if w.detector == "margin"]
+    wet |= {i: e for i, w in warned for e in episodes if e.start_s < w.end_s and w.start_s < e.end_s}
     levels = [(1 + (e.severity == "full")) * (i in wet) for i, e in enumerate(result.events)]
     spans = [[round(e.start_s, 6), round(e.end_s, 6), n] for e, n in zip(result.events, levels, strict=True)]
     # what is shaded is the water, not how long a detector holds its alarm

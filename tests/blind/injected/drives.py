@@ -40,9 +40,7 @@ BRAKE = (
 FRONT_BRAKE = 0.6
 _UNLIKELY = 1000.0  # [N m] 1022 and 1023 are error codes of the engine's controller
 _FIRST, _SECOND = ("A05", "A11", "A15", "B26"), ("A10", "A12", "A16", "A17", "B24")
-TRIPS: Mapping[str, tuple[str, ...]] = {
-    "bmw": (*_SECOND, *_FIRST), "porsche": ("track",), "rav4": ("motorway",),
-}  # fmt: skip
+TRIPS: Mapping[str, tuple[str, ...]] = {"bmw": (*_SECOND, *_FIRST), "porsche": ("track",), "rav4": ("motorway",)}
 _FILES = {"porsche": "porsche", "rav4": "toyota"}  # by which the maps turn km/h into wheel speeds
 WHEELS = ("fl", "fr", "rl", "rr")
 UNITS = {

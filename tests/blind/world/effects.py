@@ -25,9 +25,7 @@ GROUPS = {
 }
 """Signals that come from one box and share its clock."""
 
-UNKNOWN = (
-    "speed_hump", "wet_hump", "slip_saddle", "drag_patch", "gear_loss", "accelerometer_speed", "hills",
-)  # fmt: skip
+UNKNOWN = ("speed_hump", "wet_hump", "slip_saddle", "drag_patch", "gear_loss", "accelerometer_speed", "hills")
 """Effects that are in no library."""
 
 PLACE_FIXED = ("drag_patch", "hills")

@@ -60,7 +60,5 @@ def shape_of(hidden: Hidden, vehicle: Vehicle) -> Shape | None:
         radius = r * vehicle.r_e_r + (1.0 - r) * vehicle.r_e_f
         return Shape("force_balance", ("torque",), lambda T: -squares * np.maximum(T, 0.0) ** 2 / radius)
     if hidden.effect == "accelerometer_speed":
-        return Shape(
-            "force_balance", ("v_x", "a_x"), lambda x, a: v["rate"] * (np.asarray(x) - 15.0) * np.asarray(a)
-        )  # fmt: skip
+        return Shape("force_balance", ("v_x", "a_x"), lambda x, a: v["rate"] * (np.asarray(x) - 15.0) * np.asarray(a))
     return None
