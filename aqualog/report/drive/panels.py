@@ -168,7 +168,7 @@ def _margin(r: DriveResult) -> Row:
         Line(label, VEHICLE, colour, v, width, ("m/s", "km/h")) for label, _, colour, width, v in columns
         if v is not None
     )  # fmt: skip
-    about = "what is left, with 50 and 90 % intervals; below zero it floats; empty without water"
+    about = "what is left, with 50 and 90 % intervals; below zero it floats"
     return Row("Distance to full aquaplaning", about, "km/h", lines, include=(0.0, 30.0), height=150, decimals=0)
 
 
