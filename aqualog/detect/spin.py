@@ -185,14 +185,15 @@ class SpinWatch:
 
 
 def has_lost_traction(f: Features, wheel: str) -> BoolArray:
-    """Where a spin-up of a driven wheel may be water's (n,): little traction, where known (C27), and no spinning car.
+    """Where a spin-up of a driven wheel may be water's (n,): little traction (C27), and no spinning car.
 
-    A car that spins round drifts: a_y - v_x yaw_rate, the rate of its lateral velocity, is large.
+    A car that spins round drifts: a_y - v_x yaw_rate, the rate of its lateral velocity, is large. Without torque every
+    spin-up counts: cars on a dry track spin their wheels while they drift.
     """
     mu = traction(f, wheel)
+    drift = f["a_y_slow"] - f["v_x_hat"] * f["yaw_rate_slow"]
     with np.errstate(invalid="ignore"):
-        goes_on = ~(np.abs(f["a_y_slow"] - f["v_x_hat"] * f["yaw_rate_slow"]) > SIDEWAYS)
-        return goes_on if mu is None else goes_on & (mu < MU_SPIN_UP)
+        return np.ones(drift.size, dtype=bool) if mu is None else ~(np.abs(drift) > SIDEWAYS) & (mu < MU_SPIN_UP)
 
 
 def wheel_evidence(scene: Scene, wheel: str, mu: FloatArray | None) -> dict[str, Any]:
