@@ -72,9 +72,7 @@ def test_braking_is_left_out_of_a_drive():
     car = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"drivetrain", "mass"}))
     found = {}
     for braked in (False, True):
-        brakes = tuple(
-            (t, m) for k in range(4) for t, m in ((15 + 20 * k, 0), (15.3 + 20 * k, 2000), (17 + 20 * k, 0))
-        )  # fmt: skip
+        brakes = tuple((t, m) for k in range(4) for t, m in ((15 + 20 * k, 0), (15.3 + 20 * k, 2000), (17 + 20 * k, 0)))
         scenario = Scenario(
             car, duration_s=90.0, seed=7, speed=tuple((float(t), 20.0 + 4.0 * (t // 8 % 2)) for t in range(0, 91, 8)),
             steering=Steering(0.015, 4.0), brake_torque=brakes if braked else (),

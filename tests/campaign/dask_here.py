@@ -43,7 +43,5 @@ def cluster(tmp_path, *, workers=2, **kw):
     address = f"tcp://127.0.0.1:{port}"
     worker = ("dask_worker", address, "--nthreads", "1", "--no-dashboard", "--local-directory", tmp_path / "dask")
     with ExitStack() as stack:
-        scheduler = stack.enter_context(
-            dask("dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
-        )  # fmt: skip
+        scheduler = stack.enter_context(dask("dask_scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard"))
         yield address, (scheduler, *(stack.enter_context(dask(*worker, **kw)) for _ in range(workers)))

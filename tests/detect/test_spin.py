@@ -7,6 +7,7 @@ import pytest
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Track
+from aqualog.detect import spin as gate
 from aqualog.detect.detector import Scene, Setup
 from aqualog.detect.events import EventBook
 from aqualog.detect.joint_criteria import GATE, GATE_AFTER, MAY_BE_WATER
@@ -118,3 +119,9 @@ def test_shares_are_the_same_however_a_drive_is_cut(cuts):
     events += book.finish()
     known = lost[2:22][np.isfinite(lost[2:22])]
     assert events[0].evidence["mu_lost"] == np.count_nonzero(known) / known.size
+
+
+def test_without_torque_a_spin_up_counts_in_a_drifting_car_too():
+    f = {"a_y_slow": np.full(3, 9.0), "v_x_hat": np.full(3, 20.0), "yaw_rate_slow": np.zeros(3)}
+    assert gate.has_lost_traction(f, "rl").all()
+    assert not gate.has_lost_traction(f | {"mu_rl": np.zeros(3)}, "rl").any()

@@ -111,7 +111,7 @@ def test_latency_and_delay_shift_a_ramp(channel, shift):
 
 def test_an_antenna_moves_with_the_pitching_body():
     _, x = seen(drive(a_x=lambda t: 0.5 * t, v_x=lambda t: 0.0 * t), one("v_x", Channel(pitching=0.01)))["v_x"]
-    np.testing.assert_allclose(x, 0.005, rtol=0.0, atol=1e-12)
+    assert x == pytest.approx(0.005, abs=1e-12)
 
 
 def test_lag_of_a_ramp_and_of_a_step():
@@ -191,9 +191,7 @@ def test_skew_stretches_the_stamps_of_its_group_alone():
 def test_rates_of_groups():
     truth = drive(a_x=ramp, v_x=ramp, steer_angle=ramp, tie_rod_fl=ramp)
     out = seen(truth, ESC, 250.0)
-    assert {n: t.size for n, (t, _) in out.items()} == {
-        "tie_rod_fl": 2500, "a_x": 500, "v_x": 200, "steer_angle": 1000,
-    }  # fmt: skip
+    assert {n: t.size for n, (t, _) in out.items()} == {"tie_rod_fl": 2500, "a_x": 500, "v_x": 200, "steer_angle": 1000}
     assert all(t[0] == 0.0 and 9.9 < t[-1] < 10.0 for t, _ in out.values())
 
 
