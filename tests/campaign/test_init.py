@@ -110,7 +110,7 @@ def test_what_is_not_known_becomes_a_column_and_what_is_always_there_is_left_out
 
 
 def test_a_number_that_may_be_a_decimal_is_doubted():
-    assert read_names(["run_1_3mm.mf4", "x.mf4"]).notes == ('"1_3mm": read as 3, not as a decimal number; check it')
+    assert read_names(["run_1_3mm.mf4", "x.mf4"]).notes == ('"1_3mm": read as 3, not as a decimal number; check it',)
 
 
 def table(path, heading, columns, separator=","):
