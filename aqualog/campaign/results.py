@@ -222,7 +222,9 @@ def _on_water(info: RunInfo, frame: pl.DataFrame, t: FloatArray, labels: tuple[L
     if info.water_from == "lane times" and info.run.lane is not None:
         # the water of another run is neither this one's nor dry road
         others = ~(_inside([lane for lane in info.lanes if lane != info.run.lane], t) == 0.0)
-        return np.where(others, np.nan, _inside([info.run.lane], t))
+        # a stretch of dry road may be timed as a lane, too
+        inside = _inside([info.run.lane], t) * float(info.run.values.get("water_depth_mm") != 0.0)
+        return np.where(others, np.nan, inside)
     if info.water_from == "labels" and labels is not None:
         return _inside([(x.start_s, x.end_s) for x in labels if x.effect in AQUAPLANING], t)
     if info.water_from == "signal":

@@ -12,7 +12,8 @@ from aqualog.detect.registry import all_of
 __all__ = ["JOINT", "NEVER_TOGETHER", "judge"]
 
 JOINT = tuple(d.name for d in all_of("joint"))
-NEVER_TOGETHER = "a moment in which all signals of the joint detectors have a value"
+SHORTEST_S = 1.0  # [s] of dry road are no verdict: at 80 km/h a car is not across a lane then
+NEVER_TOGETHER = f"{SHORTEST_S:g} s in which all signals of the joint detectors have a value"
 
 
 def judge(
@@ -35,7 +36,7 @@ def judge(
     """
     found = episodes_of(events, way)
     wet = any(e.kind == "aquaplaning" for e in found)
-    if wet or (any(d in ran for d in JOINT) and judged_s > 0.0):
+    if wet or (any(d in ran for d in JOINT) and judged_s >= SHORTEST_S):
         return Judgement("aquaplaning" if wet else "none", (), tuple(ran), found, judged_s)
     lacks = [m for u in unavailable if u.detector in JOINT for m in u.missing]
     return Judgement("cannot_be_judged", tuple(dict.fromkeys(lacks or [NEVER_TOGETHER])), tuple(ran), found, judged_s)

@@ -19,20 +19,9 @@ from aqualog.io import atomic_write
 from aqualog.io.open_log import LOG_SUFFIXES, sniff
 
 __all__ = [
-    "check_name",
-    "expand",
-    "file_of",
-    "list_files",
-    "names_of",
-    "number_of",
-    "refuse_existing",
-    "text_of",
-    "whole_number",
-    "write_text",
-    "write_together",
-    "write_whole",
-    "writing",
-]
+    "check_name", "expand", "file_of", "list_files", "names_of", "no_vehicle", "number_of", "refuse_existing",
+    "text_of", "whole_number", "write_text", "write_together", "write_whole", "writing",
+]  # fmt: skip
 
 
 _SHOWN = 60  # characters of a name that cannot be one
@@ -186,6 +175,12 @@ def _is_log(path: Path) -> bool:
     except LogError:
         return False
     return True
+
+
+def no_vehicle(other: str) -> ConfigError:
+    """Return the error of a command that would be wrong with a default car; `other` takes the place of a file."""
+    hint = "--vehicle car.toml; `aqualog init LOG -o FOLDER` writes a vehicle file to fill in"
+    return ConfigError("no vehicle", expected=f"a vehicle file, or {other}", hint=hint)
 
 
 _FORCE = "--force (from Python force=True) to overwrite, or another name"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ConfigError
-from aqualog.face.arguments import expand, file_of, list_files, names_of, number_of, refuse_existing
+from aqualog.face.arguments import expand, file_of, list_files, names_of, no_vehicle, number_of, refuse_existing
 from aqualog.face.result import PathLike
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class CampaignInputs:
                 raise ConfigError("vehicle beside a campaign", where=names[0], expected="it in the campaign's runs")
             found = configure(file_of(names[0], "inputs"), map_file=map_file, dbc=databases, thresholds=limits)
         elif vehicle is None:
-            raise ConfigError("no vehicle", expected="a vehicle file, or a campaign file that names one")
+            raise no_vehicle("a campaign file that names one")
         else:
             found = configure_logs(
                 expand(names), file_of(vehicle, "vehicle"), map_file=map_file, dbc=databases, thresholds=limits,

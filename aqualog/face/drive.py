@@ -13,7 +13,16 @@ from aqualog.align.mapping import SignalMap, values_read
 from aqualog.core.errors import AqualogError, ConfigError, LogError, SignalError
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.face.arguments import expand, file_of, list_files, names_of, number_of, refuse_existing, write_whole
+from aqualog.face.arguments import (
+    expand,
+    file_of,
+    list_files,
+    names_of,
+    no_vehicle,
+    number_of,
+    refuse_existing,
+    write_whole,
+)
 from aqualog.face.cache import cache_of_user
 from aqualog.face.listener import Progress, listener
 from aqualog.face.result import PathLike, printable
@@ -27,16 +36,8 @@ if TYPE_CHECKING:
     from aqualog.align.load import LoadedLong
 
 __all__ = [
-    "Drive",
-    "DriveLike",
-    "check_target",
-    "convert",
-    "drive_of",
-    "read",
-    "sources_of",
-    "vehicle_needed",
-    "vehicle_of",
-]
+    "Drive", "DriveLike", "check_target", "convert", "drive_of", "read", "sources_of", "vehicle_needed", "vehicle_of",
+]  # fmt: skip
 
 Logs = PathLike | Iterable[PathLike]
 
@@ -345,7 +346,7 @@ def vehicle_of(vehicle: PathLike | Vehicle | None, drive: Drive | None = None) -
 def vehicle_needed(vehicle: PathLike | Vehicle | None, drive: Drive | None = None) -> Vehicle:
     """Return the vehicle behind an argument, or that of the drive; a default car would make the work wrong."""
     if vehicle is None and (drive is None or drive.vehicle is None):
-        raise ConfigError("no vehicle", expected='a vehicle file or aq.Vehicle.read("car.toml")')
+        raise no_vehicle('aq.Vehicle.read("car.toml")')
     return vehicle_of(vehicle, drive)
 
 

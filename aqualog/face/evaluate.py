@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ConfigError
-from aqualog.face.arguments import expand, file_of, list_files, names_of, text_of
+from aqualog.face.arguments import expand, file_of, list_files, names_of, no_vehicle, text_of
 from aqualog.face.campaign import Campaign
 from aqualog.face.campaign_inputs import is_campaign, split
 from aqualog.face.drive import sources_of
@@ -325,7 +325,7 @@ def _of_logs(
     from aqualog.evaluate.drives import LogSource
 
     if vehicle is None:
-        raise ConfigError("no vehicle", expected="a vehicle file, or a campaign file that names one")
+        raise no_vehicle("a campaign file that names one")
     paths = expand(inputs)
     if not paths:
         raise ConfigError("no log is named", expected="a campaign file, or at least one log")

@@ -84,6 +84,8 @@ def test_water_is_known_without_the_ends_of_the_lane(made):
     assert 1.5 <= wet.min() < 1.7
     assert 2.7 < wet.max() <= 2.9
     assert unknown.size == 12
+    dry = replace(data.done[0].run, values={"water_depth_mm": 0.0})
+    assert np.nansum(data.samples(replace(data.done[0], run=dry)).on_water) == 0.0
 
 
 def test_tables_open_by_themselves(made):

@@ -145,7 +145,8 @@ def test_what_is_missing_is_that_of_the_joint_detectors():
         Unavailable("joint_cusum", ("torque_rl", "vehicle.mass")),
     ]  # fmt: skip
     assert verdict((), lacks, ran=("spin_down",)).missing == ("torque_rl", "vehicle.mass")
-    assert verdict((), judged_s=0.0).missing == (NEVER_TOGETHER,)
+    assert verdict((), judged_s=0.9).missing == (NEVER_TOGETHER,)
+    assert verdict((), judged_s=1.1).verdict == "none"
     assert verdict((), lacks[:1]).missing == ()
 
 

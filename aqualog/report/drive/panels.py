@@ -84,7 +84,7 @@ def _as_logged(r: DriveResult) -> Iterator[Row]:
         decimals=0,
     )  # fmt: skip
     yield Row(
-        "Acceleration", "as logged: a_x forward (black), a_y to the left (blue)", "m/s²",
+        "Acceleration", "as logged: a_x forward, a_y to the left (blue)", "m/s²",
         lines(("-", "-"), a_x=("a_x", INK), a_y=("a_y", PALETTE[0])), include=(-1.0, 1.0),
     )  # fmt: skip
     yield Row(
