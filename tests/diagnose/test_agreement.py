@@ -23,6 +23,7 @@ def width(d):
     return e.high - e.low
 
 
+@pytest.mark.nightly
 def test_drives_with_the_same_load_agree_and_those_with_different_ones_have_a_wide_interval():
     alike = diagnose(drives(250.0, 250.0), CAR, options=OPTIONS)
     (found,) = alike.agreement

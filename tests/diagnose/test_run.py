@@ -245,6 +245,7 @@ def test_a_late_velocity_is_named_without_one_of_the_wheels(monkeypatch):
     assert any("not all four wheel speeds" in n for n in d.notes)
 
 
+@pytest.mark.nightly
 def test_the_sample_drive_is_named_with_a_file_that_says_nothing_of_its_sources(monkeypatch):
     import aqualog as aq
 

@@ -63,7 +63,8 @@ def hour(*, excited, split, seed, drift=DRIFT):
     return events, stream.slopes, piece.features
 
 
-@pytest.mark.parametrize(("excited", "split"), [(True, 0.6), pytest.param(False, 0.4, marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize(("excited", "split"), [(True, 0.6), (False, 0.4)])
 def test_an_hour_of_drifting_radii_and_slope_ratio_raises_no_alarm(excited, split):
     """C115: "robustness against slow changes in vehicle parameters and high sensitivity to sudden road condition"."""
     events, summaries, features = hour(excited=excited, split=split, seed=61)
