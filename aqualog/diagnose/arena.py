@@ -26,17 +26,9 @@ from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
 
 __all__ = [
-    "CHUNK",
-    "SHAPE_PRIOR",
-    "Arena",
-    "Part",
-    "arena_of",
-    "blocks_of",
-    "known_only",
-    "make_arena",
-    "products",
+    "CHUNK", "SHAPE_PRIOR", "Arena", "Part", "arena_of", "blocks_of", "known_only", "make_arena", "products",
     "unit_force",
-]
+]  # fmt: skip
 
 # of an effect at any place, of a shape of a mechanism, and of a road that is not even, on one drive (K)
 KNOWN_PRIOR, SHAPE_PRIOR, ROAD_PRIOR = 0.03, 0.01, 0.2

@@ -16,16 +16,9 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
 
 __all__ = [
-    "BLOCK_S",
-    "CHANNELS",
-    "Kind",
-    "block_means",
-    "block_step",
-    "centre_line_speeds",
-    "channel_values",
-    "channels_of",
+    "BLOCK_S", "CHANNELS", "Kind", "block_means", "block_step", "centre_line_speeds", "channel_values", "channels_of",
     "contrasts",
-]
+]  # fmt: skip
 
 BLOCK_S = 0.1  # [s] keeps what is slower than 5 Hz; faster motion comes from springs, gear teeth and buses
 

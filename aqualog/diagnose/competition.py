@@ -23,19 +23,9 @@ from numpy.typing import NDArray
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "COARSE",
-    "SCALES",
-    "Block",
-    "Packed",
-    "State",
-    "added",
-    "forgiving",
-    "packed",
-    "scored",
-    "scores",
-    "start",
+    "COARSE", "SCALES", "Block", "Packed", "State", "added", "forgiving", "packed", "scored", "scores", "start",
     "values",
-]
+]  # fmt: skip
 
 # share of the log-likelihood that counts in a competition: of 0.5, 0.35 and 0.25, tried on linear sets of 39
 # development drives of two other simulators, 4, 2 and 1 names were wrong and sure, 20, 21 and 20 right (D)

@@ -21,17 +21,9 @@ from aqualog.model.follow import follow
 from aqualog.model.term import Model
 
 __all__ = [
-    "BLOCK_S",
-    "DRIVES_AS_UNITS",
-    "HeldOut",
-    "LogScoreGain",
-    "block_scores",
-    "channel_gain",
-    "corridor_share",
-    "gain",
-    "log_score_gain",
-    "measured_gain",
-]
+    "BLOCK_S", "DRIVES_AS_UNITS", "HeldOut", "LogScoreGain", "block_scores", "channel_gain", "corridor_share", "gain",
+    "log_score_gain", "measured_gain",
+]  # fmt: skip
 
 BLOCK_S = 20.0  # [s] longer than the noise of any channel remembers
 DRIVES_AS_UNITS = 5  # with fewer drives their spread cannot be estimated

@@ -17,16 +17,8 @@ from aqualog.model.scenario import Lane, Profile, Scenario, Steering
 from aqualog.model.term import Check, Model, Term
 
 __all__ = [
-    "LENGTH_S",
-    "RUNS",
-    "SENSORS",
-    "Run",
-    "Sensor",
-    "checks",
-    "fitting",
-    "programme",
-    "turned",
-]
+    "LENGTH_S", "RUNS", "SENSORS", "Run", "Sensor", "checks", "fitting", "programme", "turned",
+]  # fmt: skip
 
 LENGTH_S = 60.0
 RATE_HZ = 50.0  # [Hz] of a simulated run; residuals are means over 0.1 s

@@ -41,6 +41,8 @@ COVERED, REFITTED = 0.98, 6  # share of the posterior that is refitted, and the 
 FORM = 0.3
 NEAR = 10.0  # [nats] behind the best set, within which a single effect is refitted
 DOUBT = 0.05  # share of what an effect shows that a channel may show more or less than in the simulator (K)
+# share of what a set explains, by which a simulator of other structure errs: one more effect has to explain more (K)
+STRUCTURE = 0.01
 HALF = 0.5  # probability from which a slope or bank of the road is marginalised
 UNUSUAL = 3.0  # of its prior's standard deviations, beyond which a value is not listed by a relation alone
 
@@ -216,7 +218,8 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
         if compatible(evidence, own):
             equal.add(as_blocks(own))
     # one effect that two others imitate: its evidence rests on how well the simulator knows what it does
-    chosen += [m for m, e in posterior.sets if len(m) == 1 < len(best) and e > linear[best] - NEAR]
+    near = linear[best] - max(NEAR, 2.0 * STRUCTURE * linear[best])
+    chosen += [m for m, e in posterior.sets if len(m) == 1 < len(best) and e > near]
     chosen = [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m]
     measure = metric(arena, posterior.weighings, coarse=COARSE)
     y = measure.rows([r[None] for r in evidence.residuals])
@@ -250,6 +253,7 @@ def _levelled(
     slip is proportional to one over the square of the remaining contact: the form of the law decides, which nobody has.
     """
     top = options.get(best)
+    structure = STRUCTURE * max(o.evidence for o in options.values())
     out = []
     for members, o in options.items():
         gained = o.evidence
@@ -267,7 +271,8 @@ def _levelled(
             and _about_water(evidence, arena, best)
         ):
             gained = min(top.evidence, o.evidence + FORM * max(top.evidence, 0.0))
-        out.append(replace(o, evidence=gained))
+        more = len(best if members in equal else members) - 1
+        out.append(replace(o, evidence=gained - structure * max(more, 0)))
     return out
 
 

@@ -16,16 +16,9 @@ from aqualog.physics.kinematics import kinematic_steer_angle
 from aqualog.physics.load import G
 
 __all__ = [
-    "A_MOST",
-    "BRAKE_PRESSURE",
-    "LEAST_S",
-    "V_MIN",
-    "brakes_in_torque",
-    "brakes_unlogged",
-    "needed_torque",
-    "road_wheel_angle",
-    "roll_out",
-]
+    "A_MOST", "BRAKE_PRESSURE", "LEAST_S", "V_MIN", "brakes_in_torque", "brakes_unlogged", "needed_torque",
+    "road_wheel_angle", "roll_out",
+]  # fmt: skip
 
 STEER_S = 0.5  # [s]
 V_MIN = 4.0  # [m/s] below it, creeping, clutch and standstill dominate

@@ -19,17 +19,8 @@ from aqualog.model.term import Model
 from tests.blind.metrics.engine import Drive, Noise, noise_of, prepare, residual, shapes, unit_innovations
 
 __all__ = [
-    "Log",
-    "chance",
-    "clean_trace",
-    "length",
-    "log_of",
-    "p_right",
-    "pairs_tested",
-    "share_left",
-    "span_left",
-    "white",
-]
+    "Log", "chance", "clean_trace", "length", "log_of", "p_right", "pairs_tested", "share_left", "span_left", "white",
+]  # fmt: skip
 
 _TINY = 1e-9
 

@@ -15,17 +15,8 @@ from aqualog.core.vehicle import KEYS, Vehicle
 from .tyre import tmeasy
 
 __all__ = [
-    "ARCHETYPES",
-    "FILE_ERRORS",
-    "NO_ODD",
-    "SPREAD",
-    "Car",
-    "Odd",
-    "draw_car",
-    "of_the_day",
-    "settle",
-    "vehicle_file",
-]
+    "ARCHETYPES", "FILE_ERRORS", "NO_ODD", "SPREAD", "Car", "Odd", "draw_car", "of_the_day", "settle", "vehicle_file",
+]  # fmt: skip
 
 G = 9.81
 SPREAD: Mapping[str, float] = {"mass": 0.004, "drag_area": 0.015, "rolling_resistance": 0.015, "torque_gain": 0.003}

@@ -16,18 +16,8 @@ from .roads import Place
 from .sensors import WHEELS, Error
 
 __all__ = [
-    "HELD_BACK",
-    "KINDS",
-    "TWINS",
-    "Hidden",
-    "Kind",
-    "Setup",
-    "applied",
-    "draw",
-    "enlarged",
-    "in_worths",
-    "names_of",
-]
+    "HELD_BACK", "KINDS", "TWINS", "Hidden", "Kind", "Setup", "applied", "draw", "enlarged", "in_worths", "names_of",
+]  # fmt: skip
 
 Values = Mapping[str, float]
 DRY = ("city", "country", "motorway", "staircase", "coast_down")
