@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from aqualog.face.watch import watch
     from aqualog.model.term import Model
 
-__version__ = "0.18.0"
+__version__ = "0.19.0"
 
 _FACE = {
     "read": "aqualog.face.drive",
@@ -72,32 +72,10 @@ _FACE = {
 _MODULES = ("physics", "thesis")
 
 __all__ = [
-    "AqualogError",
-    "Campaign",
-    "Drive",
-    "Model",
-    "Signals",
-    "Vehicle",
-    "__version__",
-    "align",
-    "cache",
-    "calibrate",
-    "convert",
-    "detect",
-    "diagnose",
-    "doctor",
-    "evaluate",
-    "init",
-    "inspect",
-    "physics",
-    "read",
-    "simulate",
-    "slip_slope",
-    "thesis",
-    "tyre_test",
-    "validate",
-    "watch",
-]
+    "AqualogError", "Campaign", "Drive", "Model", "Signals", "Vehicle", "__version__", "align", "cache", "calibrate",
+    "convert", "detect", "diagnose", "doctor", "evaluate", "init", "inspect", "physics", "read", "simulate",
+    "slip_slope", "thesis", "tyre_test", "validate", "watch",
+]  # fmt: skip
 
 
 class _Package(ModuleType):

@@ -1,4 +1,4 @@
-"""Speed of full aquaplaning of a configuration: from the slip slope, from minor spin-downs, from full ones."""
+"""Speed of full aquaplaning of a configuration: from slip slopes, minor spin-downs, full ones, and foretold."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ __all__ = ["EVENTS", "FullSpeed", "fit_contact", "fit_half", "full_speeds"]
 MINOR_BELOW = 20.0 * KMH  # [m/s] thesis 2.1 (C17): minor spin-downs begin so far below full aquaplaning
 MINOR_HALF = 5.0 * KMH  # [m/s] tolerance of that, treated as a 95 % interval
 DRAWS = 400
+Z95 = 1.959964  # 97.5 % quantile of the normal distribution
 SEED = 20_240  # of the draws; another seed moves an interval's ends by a tenth of its width
 LEAST_BINS = 3
 LEAST_PASSES = 6
@@ -27,6 +28,8 @@ LEAST_EACH = 3  # passes with and without events; with fewer the interval is too
 SIGMA_MIN = 0.01  # [-] of a contact: a bin is not more accurate than that, because its water fluctuates
 CONTACT_MAX = 0.92  # [-] a contact that stays above this does not show where it ends
 EXTRAPOLATED = 1.5  # times the fastest bin: beyond it, the curve is a guess
+FASTEST = 20  # power of the speed by which passes count: half of the weight 3.5 % below the fastest
+UNLIKE = 0.2  # [-] standard deviation of the logarithm, from which on the margin says little more than tyres in general
 _EXPONENTS = np.linspace(2.0, 8.0, 13)
 _SPEEDS = np.arange(50.0, 250.5, 0.5) * KMH
 _WIDTHS = np.array([1.0, 1.5, 2.0, 3.0, 4.5, 6.5, 9.5, 14.0]) * KMH
@@ -44,6 +47,10 @@ EVENTS = {
         "half of passes stop a wheel",
         "half of the passes have a full spin-down of a free wheel; elsewhere the contact need not be 0",
     ),
+    "margin": (
+        "a free wheel stops",
+        "a front wheel that rolls freely would stop, by the margin of passes that may all be slower",
+    ),
 }  # fmt: skip
 """Event at the speed of each method: in short, and in full."""
 
@@ -52,8 +59,8 @@ EVENTS = {
 class FullSpeed:
     """Speed of full aquaplaning of a configuration.
 
-    `way`: `slip_slope`, `minor_spin_down`, `spin_down`; the three are different `event`s, see `EVENTS`. `place` is a
-    wheel, or `free` for the free wheels together.
+    `way`: `slip_slope`, `minor_spin_down`, `spin_down`, `margin`; they are different `event`s, see `EVENTS`. `place` is
+    a wheel, or `free` for the free wheels together.
     `v` with `ci` [m/s]; NaN without an estimate; an infinite upper end is open. `exponent` n of the contact's curve,
     NaN for the other methods. `rests_on`: bins or passes used. `reason` why there is no value.
     """
@@ -79,7 +86,7 @@ class FullSpeed:
 
 
 def full_speeds(data: CampaignData, plan: Plan, table: SlopeTable) -> tuple[FullSpeed, ...]:
-    """Speeds of all configurations with water, by all three methods.
+    """Speeds of all configurations with water, by all four methods.
 
     Intervals: 2.5 and 97.5 % of 400 repetitions. From slopes: the bins' slopes and the dry one, common to all of them,
     drawn from their intervals (Student's t, so that few runs give wide intervals). Residuals of L about the curve that
@@ -89,7 +96,8 @@ def full_speeds(data: CampaignData, plan: Plan, table: SlopeTable) -> tuple[Full
     v_full is not constant: it falls with speed, since the front wheel leaves more water. On simulated campaigns of 871
     drives the intervals hold five of six rear wheels' speeds, whether that at the fastest passes or that at which it is
     reached. The other methods use events on uneven water and give speeds 15 to 20 km/h below the end of an even
-    contact.
+    contact. The margin's passes share tyre, water and the laws that it errs by, so that its interval is that of one
+    pass. Of passes 15 to 45 km/h below full aquaplaning it is mostly too high.
     """
     rng = np.random.default_rng(SEED)
     by_wheel: dict[tuple[Group, str], list[SlopeRow]] = {}
@@ -105,6 +113,7 @@ def full_speeds(data: CampaignData, plan: Plan, table: SlopeTable) -> tuple[Full
         by_group.setdefault(group_of(p.info, plan.keys), []).append(p)
     for group, members in by_group.items():
         found += [_from_passes(group, members, way, rng) for way in ("minor_spin_down", "spin_down")]
+        found.append(_foretold(group, members))
     return tuple(found)
 
 
@@ -203,6 +212,22 @@ def _from_passes(group: Group, members: Sequence[Pass], way: str, rng: np.random
     v_half, more = float(best[0]), MINOR_HALF if early else 0.0
     ci = v_half - math.hypot(v_half - low, more) + above, v_half + math.hypot(high - v_half, more) + above
     return FullSpeed(*bare, v_half + above, ci, rests_on=on)
+
+
+def _foretold(group: Group, members: Sequence[Pass]) -> FullSpeed:
+    """(d): mean of the speeds that the margin expects; the fastest passes, nearest to it, count most."""
+    bare = (group, "free", "margin")
+    m, s, v = np.array([(*p.foretold, p.v_mean) for p in members if math.isfinite(p.foretold[0])]).reshape(-1, 3).T
+    fastest = 3.6 * max(p.v_mean for p in members)
+    on = f"the margin of {m.size} of {len(members)} passes, the fastest at {fastest:.0f} km/h"
+    w = (v / max(v, default=1.0)) ** FASTEST
+    spread = float(w @ s / w.sum()) if m.size else math.inf
+    if spread > UNLIKE:
+        why = "too far below full aquaplaning" if m.size else "no pass in which the margin saw water"
+        return FullSpeed(*bare, rests_on=on, reason=why)
+    mean = float(w @ m / w.sum())
+    low, high = mean - Z95 * spread, mean + Z95 * spread
+    return FullSpeed(*bare, math.exp(mean), (math.exp(low), math.exp(high)), rests_on=on)
 
 
 def fit_half(v: FloatArray, hit: BoolArray, times: FloatArray) -> FloatArray:

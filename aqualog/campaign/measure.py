@@ -46,7 +46,9 @@ class Measurement:
     [m/s²] kinematic; `a_over_v` [1/s]; `delta_a_x` [m/s²] (2.9), mean over the step, without corrections; `reason`
     (index into `REASONS`); `on_water` where the log has it; per wheel `slip_*` [-] (3.13, `about["slip_against"]` names
     the reference), `slip_min_*`, `slip_max_*` [-] extremes of rim against car with radii learnt, `mu_*` [-], `spin_*`,
-    `minor_*` (detector active). Unknown values are null. `about` is JSON: findings and faults.
+    `minor_*` (detector active); `v_full` with `v_full_low`, `v_full_high` [m/s], the speed of full aquaplaning that the
+    margin expects, and its 90 % interval, where water is probable. Unknown values are null. `about` is JSON: findings
+    and faults.
     `full`: samples at the log's own rate around its episodes, see `FullRate`; None without any.
     """
 
@@ -175,6 +177,7 @@ _MINOR = ("minor_spin_down",)
 _SIGNALS = ("v_x", "a_x", "on_water", "water_depth_left", "water_depth_right", *(f"torque_{w}" for w in WHEELS))
 _FEATURES = (
     "v_x_hat", "a_kin", "a_kin_slow", "a_y_slow", "yaw_rate_slow", "brake_pressure", "delta_a_x",
+    "full_speed_expected", "aquaplaning_margin_low", "aquaplaning_margin_high",
     *(f"{n}_{w}" for n in ("v_line", "v_w_delta") for w in WHEELS),
 )  # fmt: skip
 
@@ -271,6 +274,10 @@ class Thinning:
             "a_over_v": a_over_v[middle],
             "delta_a_x": _means(f["delta_a_x"][span], step) if "delta_a_x" in f else np.full(rows, np.nan),
         }
+        if "full_speed_expected" in f:
+            out["v_full"] = f["full_speed_expected"][middle]
+            for end in ("low", "high"):
+                out[f"v_full_{end}"] = (f["v_x_hat"] + f[f"aquaplaning_margin_{end}"])[middle]
         for name in ("on_water", "water_depth_left", "water_depth_right"):
             if name in columns:
                 out[name] = _means(columns[name][span], step)

@@ -11,10 +11,13 @@ import numpy as np
 from aqualog.campaign.bins import KMH, Group, Plan, free_of, group_of
 from aqualog.campaign.results import CampaignData, RunInfo
 from aqualog.core.intervals import Interval, poisson, wilson
+from aqualog.core.records import FloatArray
 
 __all__ = ["Pass", "SpinDownRow", "minor_spin_downs", "passes"]
 
 LEAST_S = 0.5  # [s] on the lane that count as a pass
+SETTLED_S = 1.0  # [s] on the lane, from which on the margin has seen the water
+Z90 = 1.644854  # 95 % quantile of the normal distribution
 FULL_SLIP = -0.5  # [-] a wheel that has lost half of its speed floats; smaller dips recover by themselves
 
 
@@ -22,7 +25,8 @@ FULL_SLIP = -0.5  # [-] a wheel that has lost half of its speed floats; smaller 
 class Pass:
     """One run over the watered lane: mean speed [m/s], time and distance on it, and per free wheel: `minor` spin-downs
     begun there, `full` spin-downs (found by their detector, and half of the speed lost), `deepest` slip, rim against
-    car.
+    car. `foretold`: logarithm of the speed of full aquaplaning [ln(m/s)] that the margin expects, and its standard
+    deviation, means over the lane from `SETTLED_S` on; NaN without one.
     """
 
     info: RunInfo
@@ -32,6 +36,7 @@ class Pass:
     minor: dict[str, int]
     full: dict[str, int]
     deepest: dict[str, float]
+    foretold: tuple[float, float] = (math.nan, math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +83,18 @@ def passes(data: CampaignData) -> list[Pass]:
         )  # fmt: skip
         full = {w: n if deepest[w] <= FULL_SLIP else 0 for w, n in full.items()}
         mean = float(v.mean())
-        found.append(Pass(info, mean, seconds, mean * seconds, minor, full, deepest))
+        settled = wet & (samples.t >= start + SETTLED_S)
+        foretold = _foretold(*(samples.array(f"v_full{end}")[settled] for end in ("", "_low", "_high")))
+        found.append(Pass(info, mean, seconds, mean * seconds, minor, full, deepest, foretold))
     return found
+
+
+def _foretold(v_full: FloatArray, low: FloatArray, high: FloatArray) -> tuple[float, float]:
+    known = np.isfinite(v_full) & (low > 0.0) & np.isfinite(high)
+    if not known.any():
+        return math.nan, math.nan
+    spread = np.log(high[known] / low[known]) / (2.0 * Z90)
+    return float(np.log(v_full[known]).mean()), float(spread.mean())
 
 
 def minor_spin_downs(data: CampaignData, plan: Plan) -> tuple[SpinDownRow, ...]:

@@ -17,19 +17,9 @@ from aqualog.core.errors import ConfigError
 from aqualog.io.user_file import read_small
 
 __all__ = [
-    "DEEPEST",
-    "Faults",
-    "Key",
-    "Row",
-    "Table",
-    "is_number",
-    "is_real",
-    "quoted",
-    "read",
-    "read_csv",
-    "reads_as_number",
-    "tried",
-]
+    "DEEPEST", "Faults", "Key", "Row", "Table", "is_number", "is_real", "quoted", "read", "read_csv",
+    "reads_as_number", "tried",
+]  # fmt: skip
 
 LARGEST = 16 * 2**20  # [byte]
 LARGEST_TABLE = 64 * 2**20  # [byte]

@@ -12,16 +12,9 @@ import numpy as np
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "NOWHERE",
-    "Interval",
-    "chi2_log_p",
-    "half_width",
-    "jackknife_sd",
-    "poisson",
-    "student_quantile",
-    "variance_ratio_chance",
-    "wilson",
-]
+    "NOWHERE", "Interval", "chi2_log_p", "half_width", "jackknife_sd", "poisson", "student_quantile",
+    "variance_ratio_chance", "wilson",
+]  # fmt: skip
 
 Interval = tuple[float, float]
 NOWHERE: Interval = (math.nan, math.nan)

@@ -14,29 +14,10 @@ from typing import Literal
 from aqualog.core.notation import WHEELS
 
 __all__ = [
-    "COEFFICIENTS",
-    "KEYS",
-    "POLYNOMIALS",
-    "SOURCES",
-    "SPLIT",
-    "SPREAD",
-    "WATER",
-    "Drivetrain",
-    "Key",
-    "Known",
-    "Provenance",
-    "Source",
-    "TorqueArm",
-    "Vehicle",
-    "WaterNumber",
-    "arm_lines",
-    "known_lines",
-    "provenance_lines",
-    "spread_lines",
-    "usual",
-    "vehicle_toml",
-    "water_lines",
-]
+    "COEFFICIENTS", "KEYS", "POLYNOMIALS", "SOURCES", "SPLIT", "SPREAD", "WATER", "Drivetrain", "Key", "Known",
+    "Provenance", "Source", "TorqueArm", "Vehicle", "WaterNumber", "arm_lines", "known_lines", "provenance_lines",
+    "spread_lines", "usual", "vehicle_toml", "water_lines",
+]  # fmt: skip
 
 Drivetrain = Literal["rwd", "fwd", "awd"]
 TorqueArm = Literal["effective", "loaded"]

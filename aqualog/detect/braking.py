@@ -13,16 +13,8 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.physics.load import G
 
 __all__ = [
-    "A_BRAKING",
-    "BRAKE_PRESSURE",
-    "HOLD",
-    "TRACTION",
-    "BrakeWatch",
-    "began_free",
-    "hold_on",
-    "is_braking",
-    "lasting",
-]
+    "A_BRAKING", "BRAKE_PRESSURE", "HOLD", "TRACTION", "BrakeWatch", "began_free", "hold_on", "is_braking", "lasting",
+]  # fmt: skip
 
 A_BRAKING = -2.0  # [m/s^2] neither rolling, air nor water resistance decelerates a car more than that
 BRAKE_PRESSURE = 3e5  # [Pa] above the offset and residual pressure of a released brake

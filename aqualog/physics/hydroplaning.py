@@ -14,21 +14,10 @@ from aqualog.core.records import FloatArray
 from aqualog.physics.water import drained_share
 
 __all__ = [
-    "CAPACITY_ANCHOR",
-    "F_Z_ANCHOR",
-    "H_ANCHOR",
-    "P_ANCHOR",
-    "SPIN_UP_RATIO",
-    "TREAD_ANCHOR",
-    "WaterLaw",
-    "depth_factor",
-    "full_aquaplaning_speed",
-    "gallaway_speed",
-    "horne_speed",
-    "horne_truck_speed",
-    "pavdrn_speed",
+    "CAPACITY_ANCHOR", "F_Z_ANCHOR", "H_ANCHOR", "P_ANCHOR", "SPIN_UP_RATIO", "TREAD_ANCHOR", "WaterLaw",
+    "depth_factor", "full_aquaplaning_speed", "gallaway_speed", "horne_speed", "horne_truck_speed", "pavdrn_speed",
     "usf_speed",
-]
+]  # fmt: skip
 
 KMH = 1.0 / 3.6  # [m/s]
 KNOT = 1852.0 / 3600.0  # [m/s]

@@ -17,7 +17,9 @@ from aqualog.model.log import write_simulation
 from aqualog.model.programme import SEDAN
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import simulate
+from aqualog.model.tyre import TYRES
 from tests.campaign.made import make_campaign
+from tests.margin.passes import KMH, own_full
 
 app = typer.Typer()
 app.command("bin-slipslope", no_args_is_help=True)(bin_slipslope)
@@ -70,9 +72,13 @@ def test_slopes_as_the_contract_says(campaign):
     assert row["slope"] < row["slope_dry"]
     (delay,) = document["delays"]
     assert delay["delay_s"] == pytest.approx(0.09, abs=0.02)  # 0.1 s of v_x, less what the wheels' own path takes
-    assert {"slip_slope", "minor_spin_down", "spin_down"} == {f["way"] for f in document["full_aquaplaning"]}
+    assert {"slip_slope", "minor_spin_down", "spin_down", "margin"} == {f["way"] for f in document["full_aquaplaning"]}
     assert all(f["reason"] for f in document["full_aquaplaning"] if f["v_full_kmh"] is None)
     assert document["minor_spin_downs"]
+    (foretold,) = (f for f in document["full_aquaplaning"] if f["way"] == "margin")
+    low, high = foretold["v_full_ci95_kmh"]
+    full = own_full(TYRES["worn_summer"], SEDAN, 1.3e-3, 1.9e5) / KMH
+    assert low < full < high < 1.5 * full
 
 
 def test_tables_and_files(campaign, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from aqualog.campaign import full_speed
 from aqualog.campaign.bins import KMH, Pool
 from aqualog.campaign.expected import LINEAR, contact_of, tangent_of
-from aqualog.campaign.full_speed import EVENTS, FullSpeed, _drawn, _from_passes, _from_slopes
+from aqualog.campaign.full_speed import EVENTS, FullSpeed, _drawn, _foretold, _from_passes, _from_slopes
 from aqualog.campaign.slip_slope import SlopeRow, _with_dry, contact, fit_slope
 from aqualog.campaign.spin_downs import Pass
 from aqualog.physics.tyre_brush import brush_force
@@ -143,8 +143,26 @@ def test_the_twenty_of_the_thesis_has_a_tolerance():
     assert full.ci[1] - full.ci[0] < 9.0 * KMH
 
 
+def test_what_passes_that_are_slower_foretell():
+    """The fastest passes count most; the interval is that of one, as all share tyre, water and laws."""
+
+    def of(*found):
+        return _foretold((), [Pass(None, v, 4.0, 80.0, {}, {}, {}, (np.log(full * KMH), s)) for v, full, s in found])
+
+    one, both = of((28.0, 120.0, 0.1)), of((28.0, 120.0, 0.1), (20.0, 150.0, 0.1))
+    assert one.v / KMH == pytest.approx(120.0)
+    assert 120.0 < both.v / KMH < 120.1
+    assert (
+        np.log(both.ci[1] / both.ci[0])
+        == pytest.approx(np.log(one.ci[1] / one.ci[0]))
+        == pytest.approx(0.392, abs=1e-3)
+    )
+    assert "too far" in of((28.0, 120.0, 0.25)).reason
+    assert "no pass" in _foretold((), passes(115, 85)).reason
+
+
 def test_ways_are_different_events_in_words():
-    assert len({short for short, _ in EVENTS.values()}) == 3
+    assert len({short for short, _ in EVENTS.values()}) == len(EVENTS) == 4
     speed = FullSpeed((), "free", "minor_spin_down")
     assert "20 ± 5" in speed.defines
     empty = type("T", (), {"rows": (), "dry": (), "delays": (), "left_out": {}, "robust": False})()

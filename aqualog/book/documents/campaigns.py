@@ -257,9 +257,9 @@ BIN_SLIP_SLOPE = Document(
             count("samples", "samples behind it"),
             text("reason", "why there is no value; null if there is one", null=True),
         )),
-        rows("full_aquaplaning", "speed of full aquaplaning, in up to three ways", (
+        rows("full_aquaplaning", "speed of full aquaplaning, in up to four ways", (
             *_WHEELS,
-            text("way", "how it was found: from slopes, minor spin-downs or full spin-downs"),
+            text("way", "how it was found: from slopes, minor spin-downs, full spin-downs or the margin"),
             text("event", "which event the speed belongs to"),
             text("defines", "what that event is, in words"),
             number("v_full_kmh", "km/h", "speed", null=True),

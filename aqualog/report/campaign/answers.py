@@ -17,21 +17,13 @@ from aqualog.report.drive.judged import missing_words
 from aqualog.report.values import KMH, counted, number, place
 
 __all__ = [
-    "RESISTANCE_LEVEL",
-    "WAYS",
-    "Answer",
-    "Number",
-    "answers_of",
-    "headline",
-    "off_water",
-    "summaries",
-    "verdicts",
-]
+    "RESISTANCE_LEVEL", "WAYS", "Answer", "Number", "answers_of", "headline", "off_water", "summaries", "verdicts",
+]  # fmt: skip
 
 RESISTANCE_LEVEL = 0.2  # [m/s^2] resistance from which a driver feels it, after the thesis (C46)
 HALF = 0.5  # of the dry slip slope
-WAYS = ("slip_slope", "minor_spin_down", "spin_down")
-_WAY_NAMES = ("slip slope", "minor spin-downs", "spin-downs")
+WAYS = ("slip_slope", "minor_spin_down", "spin_down", "margin")
+_WAY_NAMES = ("from the slip slope", "from the minor spin-downs", "from the spin-downs", "foretold")
 
 
 class Number(NamedTuple):
@@ -131,7 +123,7 @@ class Summary(NamedTuple):
 def summaries(answers: Sequence[Answer]) -> list[Summary]:
     """Lowest and highest speed over all configurations, by kind; a kind without any value shows dashes."""
     kinds = [
-        *((f"Full aquaplaning, from the {w}", [(a, a.full[i]) for a in answers]) for i, w in enumerate(_WAY_NAMES)),
+        *((f"Full aquaplaning, {w}", [(a, a.full[i]) for a in answers]) for i, w in enumerate(_WAY_NAMES)),
         (f"Resistance reaches {RESISTANCE_LEVEL:g} m/s²", [(a, a.resistance) for a in answers]),
         ("Half of the dry slip slope lost", [(a, a.half) for a in answers]),
     ]  # fmt: skip

@@ -34,7 +34,10 @@ _TITLES = {
     "pressure_front_bar": "bar f", "pressure_rear_bar": "bar r", "water_depth_mm": "mm", "water_depth_left_mm": "mm l",
     "load_front_kg": "kg f", "load_rear_kg": "kg r", "tread_depth_mm": "tread",
 }  # fmt: skip
-_WAYS = {"slip_slope": "slip slope", "minor_spin_down": "minor spin-downs", "spin_down": "full spin-downs"}
+_WAYS = {
+    "slip_slope": "slip slope", "minor_spin_down": "minor spin-downs", "spin_down": "full spin-downs",
+    "margin": "margin, foretold",
+}  # fmt: skip
 _LEGEND = (
     "Slope: regression line of F_x/F_z over slip within mu (5 to 95 % of the traction driven).\n"
     "C_s/F_z, the tangent at zero slip, is larger. Model slope: the model's line over the same mu.\n"
@@ -193,7 +196,7 @@ def slope_report(
             f"{d.vehicle}: v_x is late by {d.value:.3f} s ({ends(d.ci, 3)}), the slip is corrected for it"
             for d in slopes.delays
         ), "everywhere")]),
-        Section("Speed of full aquaplaning, estimated from three kinds of events", [
+        Section("Speed of full aquaplaning, estimated in four ways", [
             _table((*_titles(keys), "wheel", "from", "event", "km/h", "95 %", "based on"), [
                 (*_values(f.group), f.place, _WAYS[f.way], f.event, _shown(KMH * f.v, 0),
                  ends((KMH * f.ci[0], KMH * f.ci[1]), 0), f.reason or f.rests_on) for f in speeds

@@ -126,9 +126,10 @@ def _made(data: CampaignData, findings: Findings) -> list[str]:
         + (" and Huber's weights" if findings.robust else "")
         + ". Slope and intercept may differ from run to run. The bias from traction noise is corrected. "
         "Intervals (95 %) treat the run, not the sample, as the unit.",
-        "Full aquaplaning is estimated in three ways. Slip slope: slope / dry slope = L², with contact share "
+        "Full aquaplaning is estimated in four ways. Slip slope: slope / dry slope = L², with contact share "
         "L = 1 − (v / v_full)ⁿ. Minor spin-downs: speed at which half of the passes have one, plus 20 km/h. "
-        "Spin-downs: speed at which half of the passes have one. Intervals: bootstrap over runs.",
+        "Spin-downs: speed at which half of the passes have one. Intervals: bootstrap over runs. Foretold: mean of "
+        "what the margin expects of each pass, the fastest first, with the interval of one pass.",
         f"Resistance {RESISTANCE_LEVEL:g} m/s² and half of the dry slope: interpolated between bins with an interval. "
         "The interval ends where the ends of the band cross the level. Of several wheels, the lowest speed counts.",
     ]  # fmt: skip

@@ -6,6 +6,7 @@ const WAYS = {
   slip_slope: ["from the slip slope", "#0072B2", "circle"],
   minor_spin_down: ["from minor spin-downs", "#009E73", "square"],
   spin_down: ["from spin-downs", "#D55E00", "diamond"],
+  margin: ["foretold", "#CC79A7", "cross"],
 };
 const FEW = 9; // panels that are drawn without being asked for
 const drawn = new Map(); // id -> function that draws it

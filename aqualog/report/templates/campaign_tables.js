@@ -51,7 +51,7 @@ function speedCell(n) {
 
 function drawAnswers() {
   const head = ["Configuration", "Runs", "Full aquaplaning, from the slip slope", "Full aquaplaning, from minor spin-downs",
-    "Full aquaplaning, from spin-downs", `Resistance reaches ${D.level} m/s²`, "Half of the dry slip slope"];
+    "Full aquaplaning, from spin-downs", "Full aquaplaning, foretold", `Resistance reaches ${D.level} m/s²`, "Half of the dry slip slope"];
   const body = make("tbody");
   for (const a of D.answers) {
     if (!now.groups.has(a[0])) continue;
