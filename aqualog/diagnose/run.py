@@ -41,6 +41,7 @@ from aqualog.model.term import Model
 __all__ = ["Options", "diagnose"]
 
 LEAST_USED_S = 20.0
+SAME = 0.2  # of what a signal changes by from sample to sample, a difference that is rounding
 # of twice the log-likelihood that an effect must gain to be more likely than none: its prior, and what its freedom
 # costs in the competition (2.5 nats (natural logarithm), typical of 300 s)
 HEARD = 2.0 * (2.5 - math.log(KNOWN_PRIOR)) / COARSE
@@ -311,11 +312,26 @@ def _prepared(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle) -> tuple[
         if out and d.channels != out[0].channels:
             notes.append(f"{name}: other channels than {out[0].name}, left out")
             continue
+        again = next((o.name for o in out if _is_same(o, d)), None)
+        if again is not None:
+            notes.append(f"{name}: the same drive as {again}, left out: it would count twice")
+            continue
         out.append(d)
         notes += [f"{name}: {n}" for n in d.notes]
     if not out:
         raise SignalError("no drive can be used", hint="; ".join(notes[:3]))
     return out, tuple(notes)
+
+
+def _is_same(a: Drive, b: Drive) -> bool:
+    """Whether two logs hold one drive, perhaps in two formats: their signals differ by less than noise does."""
+    n = min(a.speed.size, b.speed.size)
+    if a.dt != b.dt or abs(a.speed.size - b.speed.size) * a.dt > 0.1:
+        return False
+    return all(
+        float(np.std(a.columns[s][:n] - b.columns[s][:n])) <= SAME * float(np.std(np.diff(a.columns[s][:n])))
+        for s in a.present & b.present
+    )
 
 
 def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> str:

@@ -175,6 +175,14 @@ def test_a_drive_of_seconds_is_an_error_alone_and_a_note_among_others():
     assert any("5 s of drive" in n for n in d.notes)
 
 
+def test_a_drive_that_is_given_twice_counts_once():
+    log = noisy()
+    again = changed(log, log.frame.with_columns(pl.col("v_x", "a_x").round(3)).head(log.frame.height - 3))
+    d = diagnose([("a.mf4", log), ("a.csv", again), ("b.mf4", noisy(seed=4))], CAR, options=QUICK)
+    assert d.drives == ("a.mf4", "b.mf4")
+    assert any("a.csv: the same drive as a.mf4" in n for n in d.notes)
+
+
 def test_what_the_model_knows_is_not_found_again():
     mass = term("payload_mass", delta_mass=250.0)
     d = told(mass, model=Model((mass,)))
