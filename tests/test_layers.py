@@ -93,38 +93,13 @@ def test_detectors_read_no_truth_and_no_labels():
     assert not [s for s in INPUTS if s.startswith(("true_", "on_water", "water_depth"))]
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        ["--help"],
-        *(
-            [c, "--help"]
-            for c in (
-                "detect",
-                "inspect",
-                "init",
-                "align",
-                "simulate",
-                "figures",
-                "slip-slope",
-                "calibrate",
-                "evaluate",
-                "batch",
-                "bin-slipslope",
-                "bin-resistance",
-                "report",
-                "reproduce",
-                "campaign",
-                "diagnose",
-                "cache",
-                "test",
-                "plan",
-                "doctor",
-                "help",
-            )
-        ),
-    ],
+COMMANDS = (
+    "detect inspect init align simulate figures slip-slope calibrate evaluate batch bin-slipslope bin-resistance report "
+    "reproduce campaign diagnose cache test plan doctor help"
 )
+
+
+@pytest.mark.parametrize("command", [["--help"], *([c, "--help"] for c in COMMANDS.split())])
 def test_help_imports_nothing_heavy(command):
     code = f"import sys; sys.argv = ['aqualog', *{command!r}]\nfrom aqualog.cli.main import run\ntry:\n    run()\nexcept SystemExit:\n    pass\nprint('LOADED', *sys.modules)"
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout

@@ -25,6 +25,7 @@ from tests.blind.multibody.sensors import NOISES, gusts, measure
 DISTANCE = (-8.0 * KMH, 55.0 * KMH)  # [m/s] below full aquaplaning at the entry
 V_FULL = (60.0 * KMH, 150.0 * KMH)
 V_LEAST = 50.0 * KMH
+AGAIN = (15.0 * KMH, 45.0 * KMH)  # [m/s] below full aquaplaning, of further runs of a campaign
 DT = 0.01
 FOREIGN_FROM = 500_000  # seeds of the other simulator, so that no number is used twice
 _SPEEDS = np.arange(30.0, 260.0, 0.25) * KMH
@@ -84,11 +85,12 @@ def any_tyre(tyre: Tyre, rng: np.random.Generator) -> Tyre:
 
 
 def own_pass(
-    seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE, broad: bool = False
-) -> Pass:
+    seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE, broad: bool = False,
+    run: int = 0,
+) -> Pass:  # fmt: skip
     """A pass of the project's simulator at about one speed: tyre, pressure, water and car are drawn.
 
-    `broad`: with laws drawn by `any_tyre`, to learn from.
+    `broad`: with laws drawn by `any_tyre`, to learn from. `run`: another pass of the same tyre, water and car.
     """
     rng = np.random.default_rng([seed, 79 if broad else 77])
     pool = (SCORING_POOL, TUNING_POOL)[int(rng.integers(2))]
@@ -106,6 +108,9 @@ def own_pass(
         v = full - away
         if V_FULL[0] <= full <= V_FULL[1] and V_LEAST <= v <= 160.0 * KMH:
             break
+    if run:
+        rng = np.random.default_rng([seed, run, 77])
+        v = full - rng.uniform(*AGAIN)
     k = Drawing(rng, pool, car, tyre, p, int(rng.integers(2**31)))
     approach, stay = k.between(9.0, 16.0), 4.0
     a = k.between(-0.4, 0.4) if k.between(0.0, 1.0) < 0.3 else 0.0
@@ -135,7 +140,9 @@ def foreign_full(car, depth: float) -> float:
     return first_stop(0.78 * float(car.mu[0]) * (1.0 - lost) * F_z, 0.6 * push + rolling * F_z)
 
 
-def foreign_pass(seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE) -> Pass:
+def foreign_pass(
+    seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE, run: int = 0
+) -> Pass:
     """A pass of `tests.blind.multibody`: other contact, drag and tyre laws, another driver and other sensors."""
     rng = np.random.default_rng([seed + FOREIGN_FROM, 78])
     away = rng.uniform(*distance)
@@ -153,6 +160,9 @@ def foreign_pass(seed: int, drivetrain: str | None = None, *, distance: tuple[fl
         v = full - away
         if V_FULL[0] <= full <= V_FULL[1] and V_LEAST <= v <= 160.0 * KMH:
             break
+    if run:
+        rng = np.random.default_rng([seed, run, 78])
+        v = full - rng.uniform(*AGAIN)
     approach, stay = rng.uniform(9.0, 16.0), 4.0
     n = round((approach + stay + 2.0) / DT)
     base = own.l_f + own.l_r

@@ -2,16 +2,19 @@
 
 python -m tests.margin.study --passes 4000 --first 20000
 python -m tests.margin.study --passes 1000 --first 20000 --foreign     # tests.blind.multibody: other laws
+python -m tests.margin.study --campaigns 100 --first 70000             # of 8 runs, the fastest 15 km/h below it
 """
 
 import argparse
 
 import numpy as np
 
+from aqualog.campaign import full_speed
+from aqualog.campaign.spin_downs import SETTLED_S, Pass, _foretold
 from aqualog.detect.margin.watch import MARGIN
 from aqualog.detect.stream import DriveStream
 from tests.margin.learn import DRIVETRAINS
-from tests.margin.passes import foreign_pass, own_pass
+from tests.margin.passes import AGAIN, foreign_pass, own_pass
 
 KMH = 3.6
 CELLS = ((-8, 5), (5, 15), (15, 25), (25, 35), (35, 45), (45, 55))  # [km/h]
@@ -27,6 +30,21 @@ def outcome(p, after=2.0):
     found = (f[f"aquaplaning_margin{end}"][k] for end in ENDS)
     warned, early = active[edge : edge + 200].any(), active[: edge - 20].any()
     return (*(KMH * x for x in (p.v_full - f["v_x_hat"][k], *found)), warned, early)
+
+
+def foretold(make, seed, runs=8):
+    """A campaign of passes that never reach it: true speed of full aquaplaning and the foretold one, with its ends."""
+    found = []
+    for run in range(runs):
+        p = make(seed, DRIVETRAINS[seed % 3], distance=AGAIN[:1] * 2, run=run)
+        columns = {s: x for s, x in p.columns.items() if not s.startswith("true_")}
+        f = DriveStream(p.vehicle, round(p.dt * 1e9), columns, detectors=[MARGIN]).push(columns).features
+        lane = slice(int((p.wet[0] + SETTLED_S) / p.dt), int(p.wet[1] / p.dt))
+        v, low, high = (f[n][lane] for n in ("v_x_hat", "aquaplaning_margin_low", "aquaplaning_margin_high"))
+        told = _foretold(f["full_speed_expected"][lane], v + low, v + high)
+        found.append(Pass(None, float(v.mean()), 3.0, 1.0, {}, {}, {}, told))
+    speed = full_speed._foretold((), found)
+    return tuple(KMH * x for x in (p.v_full, speed.v, *speed.ci))
 
 
 def lines(x, title):
@@ -49,8 +67,16 @@ def main():
     parser.add_argument("--foreign", action="store_true")
     parser.add_argument("--passes", type=int, default=600)
     parser.add_argument("--first", type=int, default=20_000)
+    parser.add_argument("--campaigns", type=int, default=0)
     a = parser.parse_args()
     make, seeds = foreign_pass if a.foreign else own_pass, range(a.first, a.first + a.passes)
+    if a.campaigns:
+        x = np.array([foretold(make, seed) for seed in range(a.first, a.first + a.campaigns)])
+        true, v, low, high = x[np.isfinite(x[:, 1])].T
+        away, held = v - true, np.mean((low <= true) & (true <= high))
+        print(f"{len(x)} campaigns, speed given in {v.size}; median error {np.median(np.abs(away)):.1f}, bias "
+              f"{np.median(away):+.1f}, 95 % holds {held:.2f}, half width {0.5 * np.median(high - low):.1f} km/h")  # fmt: skip
+        return
     x = np.array([outcome(make(seed, DRIVETRAINS[seed % 3])) for seed in seeds], dtype=float)
     print("\n".join(lines(x, "foreign" if a.foreign else "own")))
 

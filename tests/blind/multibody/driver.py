@@ -136,24 +136,9 @@ def drive_along(target, coast, lateral, unrest, wander, gust, fine, slow, p, odd
             now_drive, now_brake = drive + x * (next_drive - drive), brake + x * (foot - brake)
             now_steer = steer + x * (hands - steer)
             advance(
-                k * DT + j * H,
-                k / n,
-                y,
-                f,
-                before,
-                aux,
-                fine,
-                slow,
-                p,
-                odd,
-                now_drive,
-                now_brake,
-                gear,
-                now_steer,
-                gust[k],
-                resting,
-                braked,
-            )
+                k * DT + j * H, k / n, y, f, before, aux, fine, slow, p, odd, now_drive, now_brake, gear, now_steer,
+                gust[k], resting, braked,
+            )  # fmt: skip
             row[0] += y[VX] / _SUB
             row[1] += y[YAW] / _SUB
             row[2] += now_steer / _SUB

@@ -212,9 +212,6 @@ def _saddle(s: Setup, v: Values, _: str | None) -> Setup:
     return replace(s, odd=s.odd._replace(saddle=np.array([v["depth"], torque, 0.4 * torque])))
 
 
-_EACH = dict.fromkeys(WHEELS, 1.0)
-
-
 def _by(parameter: str, **at: float) -> dict[str | None, dict[str, float]]:
     """`worth` of one parameter; `all_` is the whole car, `each` every wheel."""
     out: dict[str | None, dict[str, float]] = {}
