@@ -126,7 +126,7 @@ def diagnose(
     after = before if extended.terms == bare.terms else [_led(d, extended) for d in ready]
     gained = None
     if extended.terms != bare.terms:
-        tell("measuring the gain", 0.88)
+        tell("measuring the gain", 0.8)
         gained = _gained(ready, holdout, vehicle, bare, extended, noises[0], options)
     next_run = None
     if outcome.verdict == "cannot_tell":

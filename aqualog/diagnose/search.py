@@ -83,7 +83,7 @@ def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model
 
     def tick() -> None:
         done[0] += 1
-        tell("simulating each effect along the drive", 0.02 + 0.38 * done[0] / total)
+        tell("simulating each effect along the drive", 0.05 + 0.15 * done[0] / total)
 
     for d in drives:
         residuals.append(residual(d, model))
@@ -103,11 +103,11 @@ def search(
 
     Effects are asked for only if the test for any effect finds more than chance at this `level`.
     """
-    tell("comparing known effects", 0.4)
+    tell("comparing known effects", 0.2)
     arena = make_arena(evidence, model)
     # a first answer for whom waits: a tenth of the time that the whole takes
     first = known_only(arena, ())
-    tell(f"at first sight {_likeliest(first, compete(first, rounds=1))}; comparing with unknown forms", 0.45)
+    tell(f"at first sight {_likeliest(first, compete(first, rounds=1))}; comparing with unknown forms", 0.25)
     arena = with_elements(arena)
     posterior = compete(arena)
     k = np.r_[np.arange(evidence.count), -1]
@@ -120,7 +120,7 @@ def search(
     if forms:
         return Found(test, gram, calibration, arena, posterior, forms)
     so_far = f"so far {_likeliest(arena, posterior)}" if test.p_value <= level else "nothing beyond noise"
-    tell(f"{so_far}; comparing known effects", 0.6)
+    tell(f"{so_far}; comparing known effects", 0.55)
     if test.p_value > level:
         return Found(test, gram, calibration, arena, posterior)
     roads = [

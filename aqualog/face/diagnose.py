@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,7 +18,7 @@ from aqualog.face.campaign_runs import CampaignRuns
 from aqualog.face.detect import model_of
 from aqualog.face.drive import Drive, sources_of, vehicle_needed
 from aqualog.face.drives import DrivesLike, Grouped, NothingUsableError, drives_of, load_drives, with_own_names
-from aqualog.face.listener import Listener, Progress, listener
+from aqualog.face.listener import Listener, Progress, lasting, listener
 from aqualog.face.result import PathLike, Result, Writers, document_head, flat, page_file, table, text_file
 
 if TYPE_CHECKING:
@@ -299,15 +300,21 @@ def check_apart(drives: Sequence[Drive], unseen: Sequence[Drive]) -> None:
         raise ConfigError("is diagnosed and held out", where=str(twice), expected="other drives as holdout")
 
 
+FORESEEN = 0.1  # share of the work from which on its time can be foreseen
+
+
 def _shares(hear: Listener) -> Callable[[str, float], None]:
-    """Report each step of work with its share: renewed on a terminal, at most every tenth as lines."""
+    """Report each step of work with its share and the time left: renewed on a terminal, as lines every tenth."""
     last: list[object] = []
+    began = time.monotonic()
 
     def report(what: str, share: float) -> None:
         now = [what, round(10.0 * share) if hear.mode == "plain" else round(100.0 * share)]
         if now != last:
             last[:] = now
-            hear(f"{what}, {100.0 * min(max(share, 0.0), 1.0):.0f} %")
+            seconds = time.monotonic() - began
+            left = f", about {lasting(seconds * (1.0 - share) / share)} left" if share >= FORESEEN else ""
+            hear(f"{what}, {100.0 * min(max(share, 0.0), 1.0):.0f} %{left}")
 
     return report
 

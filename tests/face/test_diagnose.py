@@ -1,5 +1,6 @@
 """`aq.diagnose` does what `aqualog diagnose` does; the diagnosis itself is made by hand."""
 
+import importlib
 import json
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ import aqualog as aq
 from aqualog.core.notation import SYMBOLS
 from aqualog.diagnose import campaign as campaign_diagnosis
 from aqualog.diagnose import run as engine
+from aqualog.face.listener import listener
 from aqualog.io.write_table import TableColumn, write_parquet
 from tests.both_ways import check_saved, check_shown, command
 from tests.checks.made import DT, signals
@@ -130,3 +132,13 @@ def test_the_checks_of_a_campaign_stand_once_with_their_logs(tmp_path, monkeypat
     assert row["logs"] == ["log0.parquet", "log1.parquet"]
     assert row["lines"]
     assert any(n.startswith("log0.parquet") and n.endswith("(and in 1 more)") for n in result.notes)
+
+
+def test_the_time_left_follows_from_the_share(monkeypatch):
+    said, clock = [], iter([0.0, 0.5, 10.0])
+    face = importlib.import_module("aqualog.face.diagnose")
+    monkeypatch.setattr(face.time, "monotonic", lambda: next(clock))
+    report = face._shares(listener(said.append))
+    report("a", 0.0)
+    report("b", 0.25)
+    assert said == ["a, 0 %", "b, 25 %, about 30 s left"]

@@ -62,9 +62,6 @@ def nan_as_none(values):
     return [None if np.isnan(v) else v for v in values]
 
 
-# dialects
-
-
 def test_comma_point_utf8(read):
     log = read("t [s],omega_fl [rad/s],v_x (km/h),Öl [°C]\n0.00,1.5,36,80\n0.01,-2e1,37.5,81\n0.02,.5,38.,82\n")
     assert log.units == {"omega_fl": "rad/s", "v_x": "km/h", "Öl": "°C"}
@@ -260,9 +257,6 @@ def test_point_is_no_decimal_sign_beside_decimal_commas(read):
     assert log.noted('"v"', "line 152")
 
 
-# cells
-
-
 def test_blank_is_no_sample_and_bad_is_nan(read):
     log = read("t [s],a,b\n0.0,1,\n0.1,,5\n0.2,NaN,6\n0.3,-,7\n0.4,#N/A,8\n0.5,inf,9\n0.6,null,1\n0.7,1e999,2\n")
     assert log.t("a") == [k * 100_000_000 for k in (0, 2, 3, 4, 5, 6, 7)]
@@ -335,9 +329,6 @@ def test_nul_bytes_are_named(tmp_path, content):
         open_log(path)
 
 
-# rows
-
-
 def test_short_and_long_rows(read):
     lines = [f"{k / 100:.2f},{k},7\n" for k in range(300)]
     lines[10] = "0.10,10\n"
@@ -385,9 +376,6 @@ def test_stray_quote(read):
     log = read("t [s],v\n" + "".join(lines))
     assert len(log["v"]) >= 199
     assert log["v"][-1] == 199
-
-
-# time
 
 
 @pytest.mark.parametrize(
@@ -453,9 +441,6 @@ def test_the_users_time(read):
     assert read(text, time_channel="other").noted('"other"')
     with pytest.raises(ConfigError, match="km/h"):
         read(text, time_unit="km/h")
-
-
-# what the user says
 
 
 def told(name="*", **keys):
@@ -532,9 +517,6 @@ def test_a_first_line_without_an_end_is_named(read, monkeypatch):
         read("t," + ",".join(f"x{k}" for k in range(1000)) + "\n" + table())
 
 
-# refusals
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -561,9 +543,6 @@ def test_refusals_say_what_to_do(read, text, says):
 def test_missing_file(tmp_path):
     with pytest.raises(LogError, match="cannot be opened"):
         CsvReader(tmp_path / "no.csv", ReadOptions())
-
-
-# names
 
 
 @pytest.mark.parametrize(
@@ -593,9 +572,6 @@ def test_unique_names():
     many = unique_names(["a"] * 50_000)  # at once, not after a minute
     assert many[-1] == "a#50000"
     assert len(set(many)) == 50_000
-
-
-# the writer
 
 
 def test_written_headers(tmp_path):
@@ -651,9 +627,6 @@ def test_round_trip(tmp_path, rows, decimal_comma, name, unit, formula):
     assert log.faults.lost_samples == 0
 
 
-# measured drives
-
-
 @pytest.mark.real
 @pytest.mark.parametrize("trip", ["A05", "A11", "B24"])
 def test_bmw_i3(real_logs, trip):
@@ -684,9 +657,6 @@ def test_toyota_rav4(real_logs):
         assert log.faults.notes == ()
         assert log.t(log.infos[0].path)[0] > 46_408 * 10**9
     assert Read(real_logs / "toyota_rav4" / "wheel_speed.csv").units["wheel_speed_fl"] == "m/s"
-
-
-# lines and rows
 
 
 def test_words_for_a_bad_sample(read):
@@ -767,9 +737,6 @@ def test_what_is_no_table_is_refused(read, content):
         read(content)
 
 
-# parts of a file
-
-
 def saved(tmp_path, text):
     path = tmp_path / "log.csv"
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
@@ -793,9 +760,6 @@ def test_any_projection_gives_the_same(tmp_path):
         assert [c.info.name for c in found] == asked
         assert all(same(a, b) for a, b in zip(found, again, strict=True))
         assert all(same(c, whole[c.info.name]) for c in found)
-
-
-# whatever comes
 
 
 often = settings(
