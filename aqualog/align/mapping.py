@@ -28,6 +28,11 @@ MAP_HINT = "`aqualog init LOG -o FOLDER` writes a signal map; then the log with 
 EACH_ITS_OWN = "name one channel each in a signal map; `aqualog inspect LOG` lists them"
 """What to try where signals and channels do not go together one by one."""
 
+OTHER_FILES = "the folder, if its files are one drive; else another map; `aqualog inspect LOG` lists the channels"
+"""What to try where a file lacks much of what the map names."""
+
+SHOWN = 2  # missing channels that are shown with what the file has
+
 
 @dataclass(frozen=True, slots=True)
 class Entry:
@@ -169,6 +174,7 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
     """
     found: dict[str, tuple[Entry, ChannelInfo]] = {}
     faults: list[str] = []
+    missing: list[str] = []
     doubled = 0
     if not channels:  # the reader knows why: one reason, not a fault for each line of the map
         return {}
@@ -177,6 +183,9 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
         if len(matches) == 1:
             found[symbol] = (entry, matches[0])
         elif not matches:
+            missing.append(entry.channel[0])
+            if len(missing) > SHOWN:
+                continue
             faults.append(f"{_place(entry)}no channel {_quoted(entry.channel)}{_nearest(entry.channel, channels)}")
         else:
             faults.append(f"{_place(entry)}channel {_quoted(entry.channel)} is ambiguous: {_listed(matches)}")
@@ -192,10 +201,13 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
             doubled += len({m.file for m in matches}) > 1
     if doubled >= OF_SEPARATE_DRIVES:
         raise separate_drives(doubled, (c.file for c in channels))
+    if len(missing) > SHOWN:
+        faults.append(f"{len(missing) - SHOWN} more of the map's channels are missing: {listed(missing[SHOWN:], 3)}")
     if faults:
         raise SignalError(
-            "; ".join(faults), where=signal_map.path or (channels[0].file if channels else ""), hint=EACH_ITS_OWN
-        )
+            "; ".join(faults), where=signal_map.path or (channels[0].file if channels else ""),
+            hint=EACH_ITS_OWN if len(missing) <= SHOWN else OTHER_FILES,
+        )  # fmt: skip
     _refuse_twice(found, signal_map)
     return found
 

@@ -119,6 +119,14 @@ def test_missing_and_ambiguous_channels_are_named():
     assert build(*twins, entries={"v_x": Entry("v_x", ("g2.speed",))}).symbols == ("v_x",)
 
 
+def test_a_file_that_lacks_most_of_the_map_is_told_in_one_line_and_of_its_folder():
+    names = {"v_x": "speed", "a_x": "along", "a_y": "aside", "altitude": "height"}
+    with pytest.raises(SignalError) as failed:
+        build(channel("BRK", np.ones(9)), entries={s: Entry(s, (n,)) for s, n in names.items()})
+    assert "2 more of the map's channels are missing: aside, height" in failed.value.line()
+    assert "the folder, if its files are one drive" in failed.value.line()
+
+
 def test_mapped_channels_that_every_file_has_look_like_separate_drives():
     mapped = {s: Entry(s, (n,)) for s, n in (("v_x", "speed"), ("a_x", "along"), ("altitude", "height"))}
     twins = [channel(e.channel[0], np.ones(9), "-", file=f) for f in ("mon.csv", "tue.csv") for e in mapped.values()]
