@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -259,6 +259,9 @@ def _with_road(outcome: Outcome, road: Profile) -> Outcome:
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
         # one road: a constant slope is its mean, whose interval knows that it is an offset as well
         own = tuple(c for c in own if c.effect != cause.effect)
+    is_sure = outcome.verdict != "cannot_tell" or "accelerometer_bias" in outcome.certain
+    if is_sure and any(c.effect == "accelerometer_bias" for c in own):  # it has the constant that a mean would repeat
+        cause = replace(cause, parameters={n: e for n, e in cause.parameters.items() if n != "grade_mean"})
     verdict: Verdict = outcome.verdict
     if verdict in ("no_effect", "named", "compound"):
         verdict = "compound" if own else "named"

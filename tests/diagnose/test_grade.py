@@ -122,4 +122,6 @@ def test_profile_and_mean_are_one_road(hilly):
     assert (alone.verdict, [c.key for c in alone.causes]) == ("named", ["road_grade"])
     assert (both.verdict, [c.key for c in both.causes]) == ("compound", ["signal_delay@a_x", "road_grade"])
     assert alone.causes[0].parameters == {"grade_rms": found.rms, "grade_mean": found.mean}
+    bias = Cause("accelerometer_bias", "a_x", {}, (), "")
+    assert run._with_road(Outcome("named", (bias,)), found).causes[1].parameters == {"grade_rms": found.rms}
     assert len(open_.causes) == 3  # then it is not known whether it is the road's mean or another effect
