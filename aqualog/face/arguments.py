@@ -179,7 +179,7 @@ def _is_log(path: Path) -> bool:
 
 def no_vehicle(other: str) -> ConfigError:
     """Return the error of a command that would be wrong with a default car; `other` takes the place of a file."""
-    hint = "--vehicle car.toml; `aqualog init LOG -o FOLDER` writes a vehicle file to fill in"
+    hint = "name a vehicle file; `aqualog init LOG -o FOLDER` writes one to fill in"
     return ConfigError("no vehicle", expected=f"a vehicle file, or {other}", hint=hint)
 
 

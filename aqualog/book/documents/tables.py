@@ -119,6 +119,9 @@ _SAMPLES = Table(
         number("mu_WHEEL", "-", "traction coefficient"),
         flag("spin_WHEEL", "whether a spin-down or spin-up is going on"),
         flag("minor_WHEEL", "whether a minor spin-down is going on"),
+        number("v_full", "m/s", "speed of full aquaplaning that the margin expects"),
+        number("v_full_low", "m/s", "low end of its 90 % interval"),
+        number("v_full_high", "m/s", "high end of its 90 % interval"),
         count("reason", "0: the sample counts for the regression; else why it does not"),
     ),
 )
