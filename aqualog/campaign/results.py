@@ -215,7 +215,12 @@ def _water_from(run: Run, about: Mapping[str, Any]) -> str:
         return "labels"
     if "on_water" in about.get("signals", ()):
         return "signal"
-    return "dry run" if run.values.get("water_depth_mm") == 0.0 else ""
+    return "dry run" if _is_dry(run) else ""
+
+
+def _is_dry(run: Run) -> bool:
+    """Whether a run says that it has no water, in neither track: a trough may be on one side."""
+    return run.values.get("water_depth_mm") == 0.0 == run.values.get("water_depth_left_mm", 0.0)
 
 
 def _on_water(info: RunInfo, frame: pl.DataFrame, t: FloatArray, labels: tuple[Label, ...] | None) -> FloatArray:
@@ -223,7 +228,7 @@ def _on_water(info: RunInfo, frame: pl.DataFrame, t: FloatArray, labels: tuple[L
         # the water of another run is neither this one's nor dry road
         others = ~(_inside([lane for lane in info.lanes if lane != info.run.lane], t) == 0.0)
         # a stretch of dry road may be timed as a lane, too
-        inside = _inside([info.run.lane], t) * float(info.run.values.get("water_depth_mm") != 0.0)
+        inside = _inside([info.run.lane], t) * float(not _is_dry(info.run))
         return np.where(others, np.nan, inside)
     if info.water_from == "labels" and labels is not None:
         return _inside([(x.start_s, x.end_s) for x in labels if x.effect in AQUAPLANING], t)

@@ -74,9 +74,10 @@ class Run:
         ConfigError
         """
         from aqualog.core.errors import ConfigError
+        from aqualog.face.arguments import VEHICLE_HINT
 
         if self.vehicle is None:
-            raise ConfigError("no --vehicle", expected=f"a vehicle file: {why}")
+            raise ConfigError("no --vehicle", expected=f"a vehicle file: {why}", hint=VEHICLE_HINT)
 
     @contextmanager
     def hearing(self, interrupted: str = "") -> Iterator[Heard]:

@@ -253,7 +253,7 @@ def _levelled(
     slip is proportional to one over the square of the remaining contact: the form of the law decides, which nobody has.
     """
     top = options.get(best)
-    structure = STRUCTURE * max(o.evidence for o in options.values())
+    structure = STRUCTURE * max(0.0, *(o.evidence for o in options.values()))
     out = []
     for members, o in options.items():
         gained = o.evidence

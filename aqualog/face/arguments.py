@@ -19,8 +19,8 @@ from aqualog.io import atomic_write
 from aqualog.io.open_log import LOG_SUFFIXES, sniff
 
 __all__ = [
-    "check_name", "expand", "file_of", "list_files", "names_of", "no_vehicle", "number_of", "refuse_existing",
-    "text_of", "whole_number", "write_text", "write_together", "write_whole", "writing",
+    "VEHICLE_HINT", "check_name", "expand", "file_of", "list_files", "names_of", "no_vehicle", "number_of",
+    "refuse_existing", "text_of", "whole_number", "write_text", "write_together", "write_whole", "writing",
 ]  # fmt: skip
 
 
@@ -177,10 +177,12 @@ def _is_log(path: Path) -> bool:
     return True
 
 
+VEHICLE_HINT = "name a vehicle file; `aqualog init LOG -o FOLDER` writes one to fill in"
+
+
 def no_vehicle(other: str) -> ConfigError:
     """Return the error of a command that would be wrong with a default car; `other` takes the place of a file."""
-    hint = "name a vehicle file; `aqualog init LOG -o FOLDER` writes one to fill in"
-    return ConfigError("no vehicle", expected=f"a vehicle file, or {other}", hint=hint)
+    return ConfigError("no vehicle", expected=f"a vehicle file, or {other}", hint=VEHICLE_HINT)
 
 
 _FORCE = "--force (from Python force=True) to overwrite, or another name"

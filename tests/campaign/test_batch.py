@@ -86,6 +86,8 @@ def test_water_is_known_without_the_ends_of_the_lane(made):
     assert unknown.size == 12
     dry = replace(data.done[0].run, values={"water_depth_mm": 0.0})
     assert np.nansum(data.samples(replace(data.done[0], run=dry)).on_water) == 0.0
+    one_side = replace(dry, values={"water_depth_mm": 0.0, "water_depth_left_mm": 1.3})
+    assert np.nansum(data.samples(replace(data.done[0], run=one_side)).on_water) > 5.0
 
 
 def test_tables_open_by_themselves(made):

@@ -150,6 +150,8 @@ def test_one_effect_of_water_more_has_only_its_own_evidence():
     levelled = {o.members: o.evidence for o in _levelled(b, arena, options, best, set(), Model())}
     more = pytest.approx(16.0 - STRUCTURE * 20.0)  # a second effect explains more than a simulator's errors
     assert levelled == {(): -5.0, best: 20.0, other: pytest.approx(12.0 + FORM * 20.0), both: more, axles: more}
+    options = {m: Option(m, -5.0) for m in (best, both)}
+    assert {o.evidence for o in _levelled(b, arena, options, best, set(), Model())} == {-5.0}  # no gain, no share of it
 
 
 def test_the_files_own_water_is_judged_by_the_simulator():

@@ -288,10 +288,12 @@ function drawFull() {
   const height = 110 + 34 * Math.max(2, groups.length);
   later("full", height, function () {
     const names = Object.keys(WAYS), data = [], speeds_ = told.map(function (f) { return f[3] ?? f[4]; });
-    const top = 1.12 * Math.max(...speeds_, 1), bottom = Math.min(...told.map(function (f) { return f[4] ?? f[3]; })) - 5;
+    const most = Math.max(...speeds_, 1); // an end far beyond all speeds would press them together
+    const top = Math.max(1.12 * most, ...told.map(function (f) { return Math.min((f[5] ?? 0) + 3, 1.3 * most); }));
+    const bottom = Math.min(...told.map(function (f) { return f[4] ?? f[3]; })) - 5;
     for (const way of names) {
       const own = told.filter(function (f) { return f[2] === way; });
-      const offset = (names.indexOf(way) - 1) * 0.26;
+      const offset = (names.indexOf(way) - 0.5 * (names.length - 1)) * 0.22;
       const place = function (f) {
         const beside = own.filter(function (o) { return o[0] === f[0]; });
         return groups.indexOf(f[0]) + offset + (beside.length > 1 ? (beside.indexOf(f) / (beside.length - 1) - 0.5) * 0.16 : 0);
