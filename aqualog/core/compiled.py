@@ -14,6 +14,7 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 from numba import config, njit
+from numba.core.options import DefaultOptions
 from numba.core.runtime import rtsys
 
 from aqualog.core.user_folders import code_folder
@@ -22,6 +23,9 @@ __all__ = ["compiled", "inlined", "kept_code", "part"]
 
 _PATIENCE_S = 120.0  # the longest compilation takes a quarter of it on a slow machine
 _LOOK_S = 0.05
+
+# no counts of references: numba's own option for code that allocates nothing, left out where a numba has it no more
+_UNCOUNTED: dict[str, bool] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
 _inlined: dict[FunctionType, Any] = {}
 
@@ -54,9 +58,13 @@ def compiled(function: Callable[..., Any]) -> Any:
     return dispatcher
 
 
-def part(function: Callable[..., Any]) -> Any:
-    """Compile a part of a recursion into the code of its caller: small functions with names cost no call."""
-    return njit(function, error_model="numpy", forceinline=True)
+def part(function: Callable[..., Any], *, is_inline: bool = True, allocates: bool = False) -> Any:
+    """Compile a part of a recursion, into the code of its caller: small functions with names cost no call.
+
+    A part that allocates no array gets its arrays without counting references: atomic counts would take a quarter of
+    the time of a simulation.
+    """
+    return njit(function, error_model="numpy", forceinline=is_inline, **({} if allocates else _UNCOUNTED))
 
 
 def kept_code() -> frozenset[tuple[str, int]]:
@@ -87,7 +95,9 @@ def inlined(function: Callable[..., Any]) -> Any:
             *(function.__defaults__ or ()),
             *(function.__kwdefaults__ or {}).values(),
         )  # the last ones have them
-        _inlined[function] = njit(FunctionType(code, scope, function.__name__, defaults), error_model="numpy")
+        _inlined[function] = njit(
+            FunctionType(code, scope, function.__name__, defaults), error_model="numpy", **_UNCOUNTED
+        )
     return _inlined[function]
 
 

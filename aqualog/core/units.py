@@ -17,15 +17,8 @@ from numpy.typing import NDArray
 from aqualog.core.errors import SignalError
 
 __all__ = [
-    "Unit",
-    "convert",
-    "displayed_text",
-    "displayed_unit",
-    "displayed_units",
-    "is_unit",
-    "parse_unit",
-    "spellings",
-]
+    "Unit", "convert", "displayed_text", "displayed_unit", "displayed_units", "is_unit", "parse_unit", "spellings",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -66,11 +66,7 @@ def running_order(detectors: Iterable[Detector]) -> list[Detector]:
 
 
 def check_needs(
-    vehicle: Vehicle,
-    available: Collection[str],
-    *,
-    rate_hz: float,
-    detectors: Iterable[Detector] | None = None,
+    vehicle: Vehicle, available: Collection[str], *, rate_hz: float, detectors: Iterable[Detector] | None = None
 ) -> tuple[list[Unavailable], list[Unavailable]]:
     """Return which detectors cannot run, and which run without one of their conditions.
 

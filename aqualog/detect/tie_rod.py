@@ -31,13 +31,7 @@ def params(dt: float, threshold: float = THRESHOLD) -> CusumParams:
 
 
 def scaled_residual(
-    measured: FloatArray,
-    modelled: FloatArray,
-    v_x: FloatArray,
-    a_y: FloatArray,
-    is_braking: BoolArray,
-    *,
-    sigma: float,
+    measured: FloatArray, modelled: FloatArray, v_x: FloatArray, a_y: FloatArray, is_braking: BoolArray, *, sigma: float
 ) -> FloatArray:
     """Return measured minus modelled force over the scatter that it has on dry road.
 

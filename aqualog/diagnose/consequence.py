@@ -12,6 +12,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.detect.stream import detect_drive
 from aqualog.diagnose.extended import extended_inputs
 from aqualog.diagnose.records import Consequence
+from aqualog.diagnose.threads import beside
 from aqualog.evaluate.drives import labels_in
 from aqualog.evaluate.judge import LIMITS_S, beginning_in, hits
 from aqualog.evaluate.labels import Labels, Span, joined, without
@@ -79,13 +80,15 @@ def consequences(
     ConfigError
         If the car cannot drive with the terms of the model.
     """
-    seen: list[_Pair] = []
-    for i, scenario in enumerate(_scenarios(vehicle, seed)):
-        progress(f"drive {i + 1} of {len(DRY) + len(PASSES)} with the extended model")
+
+    def one(numbered: tuple[int, Scenario]) -> _Pair:
+        number, scenario = numbered
+        progress(f"drive {number} of {len(DRY) + len(PASSES)} with the extended model")
         # twice the usual step of a simulation: half the time, the same alarms
         signals = as_signals(simulate(scenario, model, dt=2e-3), vehicle=vehicle)
-        seen.append(_both(signals, vehicle, model, labels_in(signals)))
-    return _summed(seen)
+        return _both(signals, vehicle, model, labels_in(signals))
+
+    return _summed(beside(one, enumerate(_scenarios(vehicle, seed), 1)))
 
 
 class _Pair(NamedTuple):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.shapes import MECHANISMS, Mechanism, Shape
 from aqualog.diagnose.spline import POINTS, Basis
 from aqualog.diagnose.steps import EDGES, against, clipped, gain_of, intervals, trapezoid
+from aqualog.diagnose.threads import beside
 
 __all__ = ["with_elements"]
 
@@ -29,6 +31,10 @@ AGAIN, AGAIN_STEP, PHASES = (1.5, 25.0), 0.03, 40  # times that patches come aga
 PERIODS, STEP = 150.0, 0.5
 SAMPLES_A_WAVE = 6.0  # least
 LEAST_PERIODS = 0.5  # half a wave is a drift
+RATES = 50  # waves at a time, to spare memory
+
+
+Key = tuple[str, str]  # mechanism and coordinate
 
 
 class _Found(NamedTuple):
@@ -53,18 +59,34 @@ def with_elements(arena: Arena) -> Arena:
     left = clipped(white @ (part.residual - arena.made(0, deviations[None])[0]), used)
     drive = arena.evidence.drives[part.drive]
     along = {n: drive.coordinates[n][part.at] for n in ("t", "position") if n in drive.coordinates}
-    made = []
+    sought: list[tuple[Mechanism, FloatArray, FloatArray]] = []
     for m in MECHANISMS:
-        names = [n for n in along if (n,) in m.over]
-        if m.is_road or m.source not in part.responses or not names:
+        if m.is_road or m.source not in part.responses or not any((n,) in m.over for n in along):
             continue
-        weight, score = against(white @ part.responses[m.source], left, used)
-        found = [_wave(n, along[n], weight, score, used) for n in names]
+        sought.append((m, *against(white @ part.responses[m.source], left, used)))
+
+    def over(name: str) -> tuple[dict[Key, _Found | None], dict[Key, _Found | None]]:
+        """Waves and patches over one coordinate: they are made once for all mechanisms."""
+        own = [s for s in sought if (name,) in s[0].over]
+        keys = [(m.name, name) for m, _, _ in own]
+        weights, scores = np.array([s[1] for s in own]), np.array([s[2] for s in own])
+        waves = _waves(name, along[name], weights, scores, used)
+        return dict(zip(keys, waves, strict=True)), dict(
+            zip(keys, _patches(name, along[name], weights, scores), strict=True)
+        )
+
+    looked = beside(over, along)
+    waves, patches = ({k: v for each in looked for k, v in each[i].items()} for i in range(2))
+
+    def of(s: tuple[Mechanism, FloatArray, FloatArray]) -> list[tuple[Mechanism, _Found]]:
+        m, weight, score = s
         several = intervals(weight, score)
+        found = [waves.get((m.name, n)) for n in along]
         found += [_stepped(along["t"], several[:k], weight, score) for k in sorted({1, len(several)} - {0})]
-        found += [_patches(n, along[n], weight, score) for n in names]
-        made += [(m, f) for f in found if f is not None]
-    return _extended(arena, made)
+        found += [patches.get((m.name, n)) for n in along]
+        return [(m, f) for f in found if f is not None]
+
+    return _extended(arena, list(chain.from_iterable(beside(of, sought))))
 
 
 def _extended(arena: Arena, made: Sequence[tuple[Mechanism, _Found]]) -> Arena:
@@ -106,31 +128,46 @@ def _stepped(
     return _Found(kind, " and ".join(said), gain, basis, (0.5 * EDGES**2) ** len(edges))
 
 
-def _patches(name: str, x: FloatArray, weight: FloatArray, score: FloatArray) -> _Found | None:
-    """The offset that comes again after equal ways, or times, and explains most beside a constant."""
-    if not np.isfinite(x).all() or np.ptp(x) <= 0.0:
-        return None
+def _patches(name: str, x: FloatArray, weights: FloatArray, scores: FloatArray) -> list[_Found | None]:
+    """For each row of weights (k, n), the offset that comes again after equal ways, or times, and explains most."""
+    if not len(weights) or not np.isfinite(x).all() or np.ptp(x) <= 0.0:
+        return [None] * len(weights)
     low, span = float(x.min()), float(np.ptp(x))
-    rate = np.arange(*AGAIN, AGAIN_STEP)
+    rates = np.arange(*AGAIN, AGAIN_STEP)
     i, j = (k.ravel() for k in np.meshgrid(np.arange(PHASES), np.arange(1, PHASES // 2 + 1), indexing="ij"))
-    total, right = weight.sum(), score.sum()
-    best: tuple[float, tuple[float, float, float]] = (0.0, (0.0, 0.0, 0.0))
-    for f in rate.tolist():
+    total, right = weights.sum(axis=1, keepdims=True), scores.sum(axis=1, keepdims=True)
+    best = np.zeros(len(weights))
+    where = np.zeros((len(weights), 3))
+    values = np.concatenate([weights, scores]).ravel()
+    rows = np.repeat(np.arange(2 * len(weights)) * PHASES, x.size)
+    for f in rates.tolist():
         # phases of one turn, twice: a patch may begin at the end of a turn
         at = (np.mod((x - low) / span * f, 1.0) * PHASES).astype(np.intp)
-        folded = (np.tile(np.bincount(at, v, PHASES), 2) for v in (weight, score))
-        A, B = (np.concatenate([[0.0], np.cumsum(v)]) for v in folded)
-        a, b = A[i + j] - A[i], B[i + j] - B[i]
+        folded = np.bincount(rows + np.tile(at, 2 * len(weights)), values, 2 * len(weights) * PHASES)
+        sums = np.cumsum(np.tile(folded.reshape(-1, PHASES), 2), axis=1)
+        sums = np.concatenate([np.zeros((len(sums), 1)), sums], axis=1)
+        within = sums[:, i + j] - sums[:, i]
+        a, b = within[: len(weights)], within[len(weights) :]
         each = (b - a / total * right) ** 2 / np.maximum(a * (1.0 - a / total), 1e-9 * total)
-        k = int(np.argmax(each))
-        if each[k] > best[0]:
-            period = span / f
-            best = float(each[k]), (low + i[k] / PHASES * period, j[k] / PHASES * period, period)
+        k = each.argmax(axis=1)
+        top = each[np.arange(len(k)), k]
+        period = span / f
+        new = np.array([low + i[k] / PHASES * period, j[k] / PHASES * period, np.full(len(k), period)]).T
+        where = np.where((top > best)[:, None], new, where)
+        best = np.maximum(top, best)
+    tried = rates.size * i.size
+    return beside(lambda s: _patch(name, x, *s, tried), zip(weights, scores, where.tolist(), strict=True))
 
-    def column(v: tuple[float, float, float]) -> FloatArray:
+
+def _patch(
+    name: str, x: FloatArray, weight: FloatArray, score: FloatArray, now: Sequence[float], count: float
+) -> _Found | None:
+    """The patch near a start, a length and a period that explains most beside a constant."""
+
+    def column(v: Sequence[float]) -> FloatArray:
         return np.asarray(np.mod(x - v[0], v[2]) < v[1], dtype=np.float64)
 
-    now = best[1]
+    low, span = float(x.min()), float(np.ptp(x))
     gain, step = 0.0, now[1] / 4.0
     while step > 0.01 * now[1]:
         tried = [(now[0] + p * step, now[1] + q * step, now[2] + r * step / AGAIN[1])
@@ -151,35 +188,62 @@ def _patches(name: str, x: FloatArray, weight: FloatArray, score: FloatArray) ->
         (name,), own[:, None], np.eye(1), points[:, None], at_points[:, None], np.ones(points.size, dtype=bool)
     )
     unit = "m" if name == "position" else "s"
-    return _Found("patches", f"for {length:.3g} {unit} in every {period:.4g} {unit}", gain, basis, rate.size * i.size)
+    return _Found("patches", f"for {length:.3g} {unit} in every {period:.4g} {unit}", gain, basis, count)
 
 
-def _wave(name: str, x: FloatArray, weight: FloatArray, score: FloatArray, used: BoolArray) -> _Found | None:
-    """The wave over a coordinate that explains most, beside a constant."""
+def _waves(
+    name: str, x: FloatArray, weights: FloatArray, scores: FloatArray, used: BoolArray
+) -> list[_Found | None]:  # fmt: skip
+    """For each row of weights (k, n), the wave over a coordinate that explains most, beside a constant."""
     known = used & np.isfinite(x)
-    if not known.any() or np.ptp(x[known]) <= 0.0:
-        return None
+    if not len(weights) or not known.any() or np.ptp(x[known]) <= 0.0:
+        return [None] * len(weights)
     low, span = float(x[known].min()), float(np.ptp(x[known]))
-    z = np.where(known, (x - low) / span, 0.0)
-    w, s = np.where(known, weight, 0.0), np.where(known, score, 0.0)
+    z, W, S = (x[known] - low) / span, weights[:, known], scores[:, known]
     most = min(PERIODS, float(known.sum()) / SAMPLES_A_WAVE)
-    best: tuple[float, float] = (0.0, 0.0)
-    for f in np.arange(LEAST_PERIODS, most, STEP):
-        gain = gain_of(_circle(2.0 * np.pi * f * z), w, s)
-        best = max(best, (gain, float(f)))
-    if best[0] <= 0.0:
-        return None
-    for f in best[1] + STEP * np.linspace(-0.8, 0.8, 9):
-        best = max(best, (gain_of(_circle(2.0 * np.pi * f * z), w, s), float(f)))
-    phase = 2.0 * np.pi * best[1] * z
-    columns = np.where(known, _circle(phase), 0.0).T
-    points = np.linspace(0.0, 1.0, max(POINTS, min(1200, int(12 * best[1]))))
-    at = 2.0 * np.pi * best[1] * points
-    grid = (low + span * points)[:, None]
-    basis = Basis((name,), columns, np.eye(2), grid, _circle(at).T, np.ones(points.size, dtype=bool))
-    unit = "m" if name == "position" else "s"
-    manner = f"in waves of {span / best[1]:.3g} {unit}" if best[1] >= 1.0 else ""
-    return _Found("wave", manner, best[0], basis, (most - LEAST_PERIODS) / STEP)
+    rates = np.arange(LEAST_PERIODS, most, STEP)
+    coarse = _gains(rates, z, W, S)
+    out: list[_Found | None] = []
+    for k, (w, s) in enumerate(zip(W, S, strict=True)):
+        best = max(zip(coarse[:, k].tolist(), rates.tolist(), strict=True), default=(0.0, 0.0))
+        if best[0] <= 0.0:
+            out.append(None)
+            continue
+        near = best[1] + STEP * np.linspace(-0.8, 0.8, 9)
+        gain, f = max([best, *zip(_gains(near, z, w[None], s[None])[:, 0].tolist(), near.tolist(), strict=True)])
+        columns = np.zeros((x.size, 2))
+        columns[known] = _circle(2.0 * np.pi * f * z).T
+        points = np.linspace(0.0, 1.0, max(POINTS, min(1200, int(12 * f))))
+        grid = (low + span * points)[:, None]
+        at_points = _circle(2.0 * np.pi * f * points).T
+        basis = Basis((name,), columns, np.eye(2), grid, at_points, np.ones(points.size, dtype=bool))
+        unit = "m" if name == "position" else "s"
+        manner = f"in waves of {span / f:.3g} {unit}" if f >= 1.0 else ""
+        out.append(_Found("wave", manner, gain, basis, (most - LEAST_PERIODS) / STEP))
+    return out
+
+
+def _gains(rates: FloatArray, z: FloatArray, weights: FloatArray, scores: FloatArray) -> FloatArray:
+    """`gain_of` cosine and sine of each rate (F,) over z (n,), for each row of weights (k, n). (F, k)
+
+    Their inner products are sums over the wave and over that of twice the rate.
+    """
+    out = np.zeros((rates.size, len(weights)))
+    all_w, all_s = weights.sum(axis=1), scores.sum(axis=1)
+    for i in range(0, rates.size, RATES):
+        turns = np.exp(2j * np.pi * rates[i : i + RATES, None] * z)
+        once, twice, right = turns @ weights.T, (turns * turns) @ weights.T, turns @ scores.T
+        gram = np.empty((*once.shape, 3, 3))
+        gram[..., 0, 0] = all_w
+        gram[..., 0, 1] = gram[..., 1, 0] = once.real
+        gram[..., 0, 2] = gram[..., 2, 0] = once.imag
+        gram[..., 1, 1], gram[..., 2, 2] = 0.5 * (all_w + twice.real), 0.5 * (all_w - twice.real)
+        gram[..., 1, 2] = gram[..., 2, 1] = 0.5 * twice.imag
+        gram += 1e-9 * np.trace(gram, axis1=2, axis2=3)[..., None, None] * np.eye(3)
+        r = np.stack([np.broadcast_to(all_s, right.shape), right.real, right.imag], axis=-1)
+        explained = (r * np.linalg.solve(gram, r[..., None])[..., 0]).sum(axis=-1)
+        out[i : i + RATES] = explained - all_s**2 / gram[..., 0, 0]
+    return out
 
 
 def _circle(phase: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from aqualog.diagnose.drive import Drive, led_by, stretches
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.tolerances import LANE_TOLERANCES, STAND_IN, TOLERANCES
 from aqualog.model.effects import EFFECTS
-from aqualog.model.follow import STEP_S, follow
+from aqualog.model.follow import STEP_S, Led, led_along, shown
 from aqualog.model.term import Effect, Model, Need, Parameter, Term
 
 __all__ = ["Hypothesis", "hypotheses", "residual", "signatures", "simulated", "value_in", "with_values"]
@@ -172,23 +172,27 @@ def value_in(model: Model, h: Hypothesis, name: str) -> float:
     return h.parameter(name).neutral
 
 
-def residual(drive: Drive, model: Model, *, step: float = STEP_S) -> FloatArray:
+def residual(drive: Drive, model: Model, *, step: float = STEP_S, like: Led | None = None) -> FloatArray:
     """Residual channels of a drive under a model, simulated in steps of `step` [s]. (C, m)
 
-    A model that changes the velocity's sensor changes the target speed, which is computed again.
+    A model that changes the velocity's sensor changes the target speed, which is computed again. `like`: the drive
+    along the same course in these steps under another model, which need not be driven again for a sensor's effect.
     """
-    shown = simulated(drive, model, step=step)
+    shown = simulated(drive, model, step=step, like=like)
     measured = channel_values(drive.columns, drive.channels, drive.vehicle, dt=drive.dt)
     return measured - channel_values(shown, drive.channels, drive.vehicle, dt=drive.dt)
 
 
-def simulated(drive: Drive, model: Model, *, step: float = STEP_S) -> dict[str, FloatArray]:
+def simulated(
+    drive: Drive, model: Model, *, step: float = STEP_S, like: Led | None = None
+) -> dict[str, FloatArray]:  # fmt: skip
     """Signals of the drive as the simulation has them under a model, those that the log has alone. Each (n,)"""
     if any(t.place == "v_x" for t in model.terms):
-        drive = led_by(drive, model)
-    shown = follow(drive.vehicle, drive.course, model, step=step)
+        drive, like = led_by(drive, model), None
+    led = led_along(drive.vehicle, drive.course, model, step=step, like=like)
+    own = shown(led.truth, led.setup.sensors, drive.course)
     # of the same signals: both sides must use the same speed, either the reference or the wheels
-    return {n: x for n, x in shown.items() if n in drive.present or n == "nudge_seen"}
+    return {n: x for n, x in own.items() if n in drive.present or n == "nudge_seen"}
 
 
 def signatures(
@@ -209,7 +213,12 @@ def signatures(
     # the force in a tie rod jumps with the torque
     is_rough = not drive.course.lanes and not drive.course.has_rods
     is_rough &= not any(t.effect.drive.is_quick for t in model.terms)
-    rough = residual(drive, model, step=ROUGH_S) if is_rough else base
+    leads = any(t.place == "v_x" for t in model.terms)
+    led = led_along(drive.vehicle, drive.course, model, step=ROUGH_S) if is_rough and not leads else None
+    rough = residual(drive, model, step=ROUGH_S, like=led) if is_rough else base
+
+    def changed_to(model: Model, step: float) -> FloatArray:
+        return residual(drive, model, step=step, like=led if step == ROUGH_S else None)
 
     def one(h: Hypothesis) -> FloatArray:
         out = []
@@ -220,15 +229,15 @@ def signatures(
                 # noise of an input, shifted one way only, would correlate with itself in the residual
                 p = h.parameter(name)
                 low, high = max(at - step, p.low), min(at + step, p.high)
-                ends = [residual(drive, with_values(model, [(h, {name: x})]), step=step_s) for x in (low, high)]
+                ends = [changed_to(with_values(model, [(h, {name: x})]), step_s) for x in (low, high)]
                 out.append((ends[0] - ends[1]) / (high - low))
                 continue
             try:
                 changed = with_values(model, [(h, {name: at + step})])
-                out.append((start - residual(drive, changed, step=step_s)) / step)
+                out.append((start - changed_to(changed, step_s)) / step)
             except ConfigError:
                 changed = with_values(model, [(h, {name: at - step})])
-                out.append((residual(drive, changed, step=step_s) - start) / step)
+                out.append((changed_to(changed, step_s) - start) / step)
         tick()
         return np.array(out)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import chain, combinations
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from aqualog.diagnose.noise import Noise
 from aqualog.diagnose.outcome import Rival
 from aqualog.diagnose.records import SURE, Manoeuvre
 from aqualog.diagnose.run_information import Case, Forecast, entropy, forecast, of_check, of_log, of_run
+from aqualog.diagnose.threads import beside
 from aqualog.diagnose.words import name_of
 from aqualog.model.term import Check, Model
 
@@ -104,12 +105,14 @@ def _options(
     times: Sequence[int] = TIMES,
 ) -> list[_Option]:  # fmt: skip
     log = of_log(case)
-    out = []
-    for w in what:
+
+    def one(w: Run | Check) -> list[_Option]:
         added = of_run(case, w, sensor) if isinstance(w, Run) else of_check(case, w)
         often = times if isinstance(w, Run) else (1,)
-        out += [_Option(w, n, forecast(case, log, added, n, group), sensor) for n in often]
-    return out
+        return [_Option(w, n, forecast(case, log, added, n, group), sensor) for n in often]
+
+    # a single one has both threads for itself
+    return list(chain.from_iterable(beside(one, what) if len(what) > 1 else map(one, what)))
 
 
 def _confirmed(case: Case, options: Sequence[_Option], group: FloatArray) -> _Option:

@@ -17,6 +17,7 @@ from aqualog.diagnose.judge import repeats
 from aqualog.diagnose.records import SURE, Alternative, Cause, Estimate, Verdict, tempered
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import Found, Option, sharpened
+from aqualog.diagnose.threads import beside
 from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence
 from aqualog.model.term import Model
@@ -91,13 +92,15 @@ def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) ->
     near = [s for s in group if s.option.refit is not None and s.share > top / CREDIBLE]
     if not near:
         return group[0]
-    sharp = []
-    for s in near:
+
+    def sharper(s: Candidate[Option]) -> Candidate[Option]:
         refit, loss = sharpened(found, s.option, model)
         causes = tuple(_refitted(found, refit, model)) if refit is not None else s.causes
         kept = replace(s, option=replace(s.option, refit=refit), causes=causes, sharp=loss)
         # with fewer tolerances a value may fall below what is worth naming
-        sharp.append(kept if kept.names == s.names else replace(s, sharp=loss))
+        return kept if kept.names == s.names else replace(s, sharp=loss)
+
+    sharp = beside(sharper, near) if len(near) > 1 else [sharper(near[0])]
     best = min(sharp, key=lambda s: s.sharp)
     return max([best, *(s for s in sharp if s.sharp - best.sharp < 2.0 * math.log(PLACES))], key=whole)
 

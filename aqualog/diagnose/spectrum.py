@@ -8,14 +8,16 @@ column under noise alone follows its chi-squared distribution. Surrogates of the
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, good_size, spectra, whitened
+from aqualog.diagnose.threads import beside
 
 __all__ = ["Weighing", "weighing"]
 
@@ -23,7 +25,7 @@ BANDWIDTH = 0.3  # of the frequency: share that spectra are averaged over to eit
 NARROWEST, WIDEST = 10, 40  # bins to either side
 SLOPED = 60  # lines whose power may follow a power law
 FASTEST_HZ, BLOCK_S = 1.5, 0.1  # half of the log-likelihood counts there: cars pitch at 1 to 2 Hz (K); samples' step
-CHUNK = 48  # columns that are transformed together
+CHUNK = 24  # columns that are transformed together
 
 Complex = npt.NDArray[np.complex128]
 
@@ -56,23 +58,30 @@ class Weighing:
 
     def rows(self, x: FloatArray) -> FloatArray:
         """Arrays (k, C, n) as rows (k, M)."""
-        out = np.empty((len(x), self.width))
-        for i in range(0, len(x), CHUNK):
-            out[i : i + CHUNK] = self._rows(spectra(bridged(np.asarray(x[i : i + CHUNK], dtype=np.float64), self.mask)))
-        return out
+        return self._chunks(len(x), lambda at: self._transformed(x[at], np.float64), np.float64)
 
     def again(self, x: Spectra) -> FloatArray:
         """The rows of arrays whose transforms are known: they stay the same for every noise."""
-        return np.concatenate(
-            [self._rows(x.of(range(i, min(i + CHUNK, len(x.values))))) for i in range(0, len(x.values), CHUNK)]
-        )
+        return self._chunks(len(x.values), lambda at: self._rows(x.of(range(at.start, at.stop))), x.values.dtype)
 
     def single(self, x: FloatArray) -> npt.NDArray[np.float32]:
         """The same in single precision, which takes half of memory and time."""
-        out = np.empty((len(x), self.width), dtype=np.float32)
-        for i in range(0, len(x), CHUNK):
-            out[i : i + CHUNK] = self._rows(spectra(bridged(x[i : i + CHUNK].astype(np.float32), self.mask)))
+        rows: npt.NDArray[Any] = self._chunks(len(x), lambda at: self._transformed(x[at], np.float32), np.float32)
+        return rows
+
+    def _chunks(self, count: int, rows: Callable[[slice], FloatArray], kind: npt.DTypeLike) -> FloatArray:
+        """Rows of `count` arrays, chunk by chunk in two threads."""
+        out: FloatArray = np.empty((count, self.width), dtype=kind)
+
+        def fill(i: int) -> None:
+            at = slice(i, min(i + CHUNK, count))
+            out[at] = rows(at)
+
+        beside(fill, range(0, count, CHUNK))
         return out
+
+    def _transformed(self, x: FloatArray, kind: npt.DTypeLike) -> FloatArray:
+        return self._rows(spectra(bridged(np.asarray(x, dtype=kind), self.mask)))
 
     def _rows(self, x: Spectra) -> FloatArray:
         flat = whitened(x, self.noise).reshape(x.values.shape)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import block_step, contrasts
@@ -89,7 +90,7 @@ def _moved(
                  for r in (-step, 0, step)]  # fmt: skip
         tried = [(low + d, high + e, max(rise + r, 0)) for d, e, r in moves]
         tried = [x for x in dict.fromkeys(tried) if x[1] - x[0] >= shortest]
-        T = np.array([trapezoid(n, *x) for x in tried])
+        T = _trapezoids(n, np.array(tried))
         shared, own = T @ (X * weight).T, (T**2) @ weight
         cross = shared @ inverse
         left = own - (cross * shared).sum(axis=1)
@@ -112,11 +113,17 @@ def _left(columns: FloatArray, weight: FloatArray, score: FloatArray) -> FloatAr
 
 def trapezoid(n: int, low: int, high: int, rise: int) -> FloatArray:
     """One from `low` to `high`, with slopes of `rise` samples about both ends; no slope at the drive's own ends."""
+    return np.asarray(_trapezoids(n, np.array([(low, high, rise)]))[0])
+
+
+def _trapezoids(n: int, edges: npt.NDArray[np.int64]) -> FloatArray:
+    """`trapezoid` of each row of edges (k, 3). (k, n)"""
     k = np.arange(n) + 0.5
-    width = max(rise, 1)
-    up = np.clip((k - low) / width + 0.5, 0.0, 1.0) if low > 0 else np.ones(n)
-    down = np.clip((high - k) / width + 0.5, 0.0, 1.0) if high < n else np.ones(n)
-    return np.asarray(np.minimum(up, down))
+    low, high, rise = edges.T[..., None]
+    width = np.maximum(rise, 1)
+    up, down = (k - low) / width + 0.5, (high - k) / width + 0.5
+    up[low[:, 0] <= 0] = down[high[:, 0] >= n] = 1.0
+    return np.asarray(np.clip(np.minimum(up, down), 0.0, 1.0))
 
 
 def gain_of(columns: FloatArray, weight: FloatArray, score: FloatArray) -> float:

@@ -9,6 +9,7 @@ from typing import Generic, TypeVar
 
 from aqualog.diagnose.records import SURE, Alternative, Cause, Verdict, tempered
 from aqualog.diagnose.sets import grouped, shares
+from aqualog.diagnose.threads import beside
 
 __all__ = ["CREDIBLE", "PLACES", "Candidate", "Decision", "candidates", "decided", "whole"]
 
@@ -103,16 +104,17 @@ def decided(
     if not unsure and not failed:
         return Decision("named" if len(own) == 1 else "compound", own, (), best, group, best.names, (), notes)
     others, total = [], sum(s.share for s in group)
-    rivals = [(best, total)]
+    rivals, rest = [(best, total)], []
     for g in ranked[1:]:
         if total >= SURE:
             break
-        weight = sum(s.share for s in g)
-        total += weight
+        total += sum(s.share for s in g)
         if g[0].names:
-            ratio = math.exp(min(max(group[0].evidence - g[0].evidence, 0.0), 700.0))
-            rivals.append((pick(g), weight))
-            others.append(Alternative(_with_probability(rivals[-1][0].large, together.marginal), ratio))
+            rest.append(g)
+    for g, picked in zip(rest, beside(pick, rest), strict=True):
+        ratio = math.exp(min(max(group[0].evidence - g[0].evidence, 0.0), 700.0))
+        rivals.append((picked, sum(s.share for s in g)))
+        others.append(Alternative(_with_probability(picked.large, together.marginal), ratio))
     shown = {c.effect: c for a in reversed(others) for c in a.causes} | {c.effect: c for c in own}
     names = [c.effect for c in own] + [n for n in shown if n not in best.names]
     certain = frozenset() if failed else best.names - unsure

@@ -17,15 +17,8 @@ from aqualog.face.result import PathLike
 from aqualog.io.fingerprint import state_of
 
 __all__ = [
-    "DrivesLike",
-    "Grouped",
-    "Loaded",
-    "NothingUsableError",
-    "drives_of",
-    "grouped",
-    "load_drives",
-    "with_own_names",
-]
+    "DrivesLike", "Grouped", "Loaded", "NothingUsableError", "drives_of", "grouped", "load_drives", "with_own_names",
+]  # fmt: skip
 
 DrivesLike = DriveLike | Sequence[DriveLike]
 _Found = TypeVar("_Found")

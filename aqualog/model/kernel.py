@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from aqualog.model.state import (
     AT,
     J_V,
     J_W,
+    MOTION_WIDTH,
     N_JACOBIAN,
     N_STATES,
     OMEGA,
@@ -65,6 +67,7 @@ class Controls(NamedTuple):
     is_uneven: bool = False  # the road has heights
     steering_friction: float = 0.0  # [N] of the rack
     follow: float = 0.0  # [1/s] without a driver: how fast the speed is drawn to `v_target`; 0: runs free
+    motion_only: bool = False  # the first `MOTION_WIDTH` columns are recorded, the others not
 
 
 def run(
@@ -86,6 +89,7 @@ def run(
     return rows
 
 
+_called = partial(part, is_inline=False)  # from two places: its code once
 _loads = inlined(load.loads_of_wheels)
 _residual_film = inlined(water.residual_film)
 _air_drag = inlined(resistance.air_drag)
@@ -105,7 +109,7 @@ _MEMORY = np.dtype([
     *((name, np.float64, N_STATES) for name in ("y", "f", "k1", "k2", "rest")),
     *((name, np.float64, N_JACOBIAN) for name in ("jac", "jac_0")),
     ("out", np.float64, WIDTH), *((name, np.float64, 4) for name in ("released", "releasing", "applied")),
-    *((name, np.float64) for name in ("is_recorded", "rack", "bent")),
+    *((name, np.float64) for name in ("is_recorded", "is_detailed", "rack", "bent")),
 ])  # fmt: skip
 
 
@@ -121,7 +125,7 @@ def _table(knots, x):  # type: ignore[no-untyped-def]
     return knots[knots.shape[0] - 1, 1]
 
 
-@compiled
+@_called
 def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-untyped-def]
     """Fill derivative, Jacobian and record at the time t [s], the state `m.y` and the controls c of the step.
 
@@ -139,7 +143,7 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
     if p.steering_friction > 0.0:
         held = _held_angle(m.rack, turned + m.bent, p.steering_friction, _PER_FORCE)
     steer = turned + held
-    warm = _warm_up_factor(t, p.warmup_extra, p.warmup_time)
+    warm = _warm_up_factor(t, p.warmup_extra, p.warmup_time) if p.warmup_extra != 0.0 else 1.0
     now = Now(t, steer, np.cos(steer), np.sin(steer), leak)
     loads = _loads(y[A_X], y[A_Y], p.mass, p.l_f, p.l_r, p.h_cg, p.track)
     command = driver(m, c, p, wheels, loads, warm, drag, slope_down)
@@ -171,14 +175,15 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
     a_y = sum_y / p.mass
     nudge = p.follow * (c.v_target - y[V_X])
     _move(m, a_x, a_y, slope_down / p.mass, moment / p.I_zz, nudge, p.roll_time)
+    out = m.out
     if m.is_recorded > 0.0:
-        out = m.out
-        out[AT.v_x], out[AT.v_y], out[AT.yaw_rate], out[AT.psi] = y[V_X], y[V_Y], y[YAW_RATE], y[PSI]
-        out[AT.position], out[AT.y_lat], out[AT.a_x], out[AT.a_y] = position, y[Y_LAT], a_x, a_y
-        out[AT.steer_angle], out[AT.drive_torque], out[AT.brake_torque] = turned, command.drive, command.brake
-        out[AT.held] = held
+        out[AT.v_x], out[AT.a_x], out[AT.a_y], out[AT.yaw_rate] = y[V_X], a_x, a_y, y[YAW_RATE]
+        out[AT.steer_angle], out[AT.position], out[AT.nudge] = turned, position, nudge
+    if m.is_detailed > 0.0:
+        out[AT.v_y], out[AT.psi], out[AT.y_lat] = y[V_Y], y[PSI], y[Y_LAT]
+        out[AT.drive_torque], out[AT.brake_torque] = command.drive, command.brake
         out[AT.grade], out[AT.lane_front], out[AT.lane_rear] = grade, front.lane, rear.lane
-        out[AT.drag], out[AT.nudge] = drag, nudge
+        out[AT.drag], out[AT.held] = drag, held
 
 
 @part
@@ -222,7 +227,7 @@ def _move(m, a_x, a_y, uphill, turning, nudge, roll_time):  # type: ignore[no-un
     f[A_Y] = (a_y - y[A_Y]) / roll_time
 
 
-@compiled
+@_called
 def _solve(f, jac, h, k):  # type: ignore[no-untyped-def]
     """Solve (1 - h J) k = f: J is diagonal but for v_x and the wheels with their belts, which are coupled."""
     for i in range(N_STATES):
@@ -289,7 +294,9 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
     y = np.empty(N_STATES)
     for i in range(N_STATES):
         y[i] = m.y[i]
-    rows = np.zeros((n // every + 1, WIDTH))
+    wanted = MOTION_WIDTH if p.motion_only > 0.0 else WIDTH
+    needs_detail = lanes.shape[0] > 0 or p.steering_friction > 0.0  # what a step leaves for later ones
+    rows = np.zeros((n // every + 1, wanted))
     cells = 2 + int((n * dt * 120.0 + 50.0) / p.ds) if lanes.shape[0] > 0 else 2
     track = np.zeros((cells, 3))
     track[:, 0] = -1.0
@@ -297,10 +304,12 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
     for k in range(n + 1):
         t = k * dt
         _fill(m.applied, applied, k)
-        m.is_recorded = 1.0
+        is_kept = k % every == 0
+        m.is_recorded = 1.0 if is_kept or needs_detail else 0.0
+        m.is_detailed = 1.0 if needs_detail or (is_kept and wanted == WIDTH) else 0.0
         _rhs(t, m, controls[k], p, wheels, knots, lanes, fields, track)
-        if k % every == 0:
-            for i in range(WIDTH):
+        if is_kept:
+            for i in range(wanted):
                 rows[k // every, i] = m.out[i]
         if k == n:
             break
@@ -317,6 +326,7 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
             m.y[i] = y[i] + dt * m.k1[i]
         _fill(m.applied, applied, k + 1)
         m.is_recorded = 0.0
+        m.is_detailed = 0.0
         _rhs(t + dt, m, controls[k + 1], p, wheels, knots, lanes, fields, track)
         for i in range(N_STATES):
             m.rest[i] = m.f[i] - 2.0 * m.k1[i]

@@ -190,10 +190,7 @@ def with_mass_at(plant: Plant, delta_mass: float, x: float) -> Plant:
             expected="a smaller mass",
         )
     return plant._replace(
-        mass=plant.mass + delta_mass,
-        l_f=plant.l_f + moved,
-        l_r=plant.l_r - moved,
-        I_zz=plant.I_zz + inertia,
+        mass=plant.mass + delta_mass, l_f=plant.l_f + moved, l_r=plant.l_r - moved, I_zz=plant.I_zz + inertia
     )
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from aqualog.core.compiled import compiled
 from aqualog.core.notation import SYMBOLS, WHEELS
@@ -123,30 +124,45 @@ def measure(truth: Truth, sensors: Sensors, *, rate_hz: float, seed: int) -> lis
     and are never interpolated; the noise is white and does not pass the lag; a perfect channel gives the samples of
     the truth bit for bit at times of the fine grid.
     """
-    groups = [_measure_group(truth, sensors, g, g.rate_hz or rate_hz, seed) for g in sensors.groups]
-    at = _sample_times(truth, rate_hz)
+    places: dict[tuple[float, float, float], _Places] = {}  # most signals are sampled at the same times
+
+    def seen_at(rate: float, channel: Channel) -> _Places:
+        key = (rate, channel.latency_s, channel.delay_s)
+        if key not in places:
+            places[key] = _places(truth, _sample_times(truth, rate) - channel.latency_s - channel.delay_s)
+        return places[key]
+
+    groups = [_measure_group(truth, sensors, g, g.rate_hz or rate_hz, seed, seen_at) for g in sensors.groups]
+    exact = seen_at(rate_hz, Channel())
     names = [n for n in truth.columns if n.startswith("true_")]
-    known = {n: _sampled(truth, _column(truth, n), at, held=_is_state(truth, n)) for n in names}
-    return [g for g in (*groups, Measured("truth", at, known)) if g.columns]
+    known = {n: exact.of(_column(truth, n), held=_is_state(truth, n)) for n in names}
+    return [g for g in (*groups, Measured("truth", _sample_times(truth, rate_hz), known)) if g.columns]
 
 
-def _measure_group(truth: Truth, sensors: Sensors, group: Group, rate_hz: float, seed: int) -> Measured:
+def _measure_group(
+    truth: Truth,
+    sensors: Sensors,
+    group: Group,
+    rate_hz: float,
+    seed: int,
+    seen_at: Callable[[float, Channel], _Places],
+) -> Measured:
     at = _sample_times(truth, rate_hz)
     columns = {}
     for name in group.signals:
         if name not in truth.columns:
             continue
         channel = sensors.channels.get(name, Channel())
-        seen = at - channel.latency_s - channel.delay_s
         if _is_state(truth, name):
-            x = _sampled(truth, _column(truth, name), seen, held=True)
+            x = seen_at(rate_hz, channel).of(_column(truth, name), held=True)
             columns[name] = with_faults(x, at, sensors.faults, names=(name, group.name))
             continue
         if name in _OMEGA and sensors.teeth > 0:
             # the controller's filter runs at the rate of its reports
-            x = _lagged(_picked_up(truth, sensors, name, seen, 1.0 / rate_hz, seed), channel.lag_s, 1.0 / rate_hz)
+            edges = _picked_up(truth, sensors, name, at - channel.latency_s - channel.delay_s, 1.0 / rate_hz, seed)
+            x = _lagged(edges, channel.lag_s, 1.0 / rate_hz)
         else:
-            x = _sampled(truth, _lagged(_rolling(truth, sensors, name, seed), channel.lag_s, _step(truth)), seen)
+            x = seen_at(rate_hz, channel).of(_lagged(_rolling(truth, sensors, name, seed), channel.lag_s, _step(truth)))
         x = _through(channel, x, at, name, group.name if group.one_draw else name, seed)
         columns[name] = with_faults(x, at, sensors.faults, names=(name, group.name))
     return Measured(group.name, at * (1.0 + group.skew_ppm * 1e-6), columns)
@@ -203,17 +219,29 @@ def _angle(truth: Truth, name: str) -> FloatArray:
     return _column(truth, angle) if angle in truth.columns else rolled_angle(_column(truth, name), dt=_step(truth))
 
 
-def _sampled(truth: Truth, x: FloatArray, at: FloatArray, *, held: bool = False) -> FloatArray:
-    """Return values of a column of the fine grid at any times; `held`: the value before, else linear between two."""
-    place = np.clip(at / _step(truth), 0.0, x.size - 1.0)
+class _Places(NamedTuple):
+    """Times as places between the rows of a fine grid: the row before, and how far it is on the way to the next."""
+
+    before: npt.NDArray[np.intp]
+    share: FloatArray
+    is_between: bool
+
+    def of(self, x: FloatArray, *, held: bool = False) -> FloatArray:
+        """Return values of a column there; `held`: the value before, else linear between two."""
+        if held or not self.is_between:
+            return x[self.before]
+        i, share = self.before, self.share
+        between = x[i] + share * (x[np.minimum(i + 1, x.size - 1)] - x[i])
+        return np.where(share > 0.0, between, x[i])
+
+
+def _places(truth: Truth, at: FloatArray) -> _Places:
+    place = np.clip(at / _step(truth), 0.0, truth.t.size - 1.0)
     near = np.rint(place)
     place = np.where(np.abs(place - near) < SNAP, near, place)
     i = place.astype(np.intp)
     share = place - i
-    if held or not share.any():
-        return x[i]
-    between = x[i] + share * (x[np.minimum(i + 1, x.size - 1)] - x[i])
-    return np.where(share > 0.0, between, x[i])
+    return _Places(i, share, bool(share.any()))
 
 
 def _lagged(x: FloatArray, tau: float, dt: float) -> FloatArray:

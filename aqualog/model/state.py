@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import namedtuple
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from aqualog.physics.resistance import air_drag
 from aqualog.physics.rolling import effective_radius
 
 __all__ = [
-    "AT", "COLUMNS", "N_JACOBIAN", "N_STATES", "WIDTH", "column", "resistance_at", "rolling_state", "wheel_columns",
+    "AT", "COLUMNS", "MOTION_WIDTH", "N_JACOBIAN", "N_STATES", "WIDTH", "column", "resistance_at",
+    "rolling_state", "wheel_columns",
 ]  # fmt: skip
 
 # states: speeds and attitude, low-passed specific forces, the driver; then four of each wheel
@@ -27,17 +29,21 @@ N_STATES = 44
 J_V, J_W = N_STATES, N_STATES + 8
 N_JACOBIAN = N_STATES + 16
 
+# what is recorded: of the car, and four of each wheel; motion first, which a drive that is followed needs alone
+_MOTION = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "position", "nudge")
+_MOTION_WHEELS = ("omega", "angle", "torque")
 _SCALARS = (
-    "v_x", "v_y", "yaw_rate", "psi", "position", "y_lat", "a_x", "a_y", "steer_angle", "drive_torque", "brake_torque",
-    "grade", "lane_front", "lane_rear", "drag", "nudge", "held",
+    "v_y", "psi", "y_lat", "drive_torque", "brake_torque", "grade", "lane_front", "lane_rear", "drag", "held",
 )  # fmt: skip
 _WHEELS = (
-    "omega", "angle", "torque", "F_x", "F_y", "F_z", "s_x", "slip_angle", "contact", "slope", "mu_max", "film",
-    "water_torque", "wave_drag", "resisting_torque", "v_along", "r_e", "v_full", "aligning", "braking", "climb",
-    "tread_omega", "twist",
+    "F_x", "F_y", "F_z", "s_x", "slip_angle", "contact", "slope", "mu_max", "film", "water_torque", "wave_drag",
+    "resisting_torque", "v_along", "r_e", "v_full", "aligning", "braking", "climb", "tread_omega", "twist",
 )  # fmt: skip
-COLUMNS = {name: i for i, name in enumerate(_SCALARS)} | {name: len(_SCALARS) + 4 * i for i, name in enumerate(_WHEELS)}
-WIDTH = len(_SCALARS) + 4 * len(_WHEELS)
+MOTION_WIDTH = len(_MOTION) + 4 * len(_MOTION_WHEELS)
+_WIDTHS = dict.fromkeys(_MOTION, 1) | dict.fromkeys(_MOTION_WHEELS, 4) | dict.fromkeys(_SCALARS, 1)
+_WIDTHS |= dict.fromkeys(_WHEELS, 4)
+WIDTH = sum(_WIDTHS.values())
+COLUMNS = dict(zip(_WIDTHS, accumulate(_WIDTHS.values(), initial=0), strict=False))
 # `AT.film + i` is the column of wheel i, in compiled code too
 AT: Any = namedtuple("At", list(COLUMNS))(**COLUMNS)
 

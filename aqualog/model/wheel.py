@@ -238,16 +238,20 @@ def wheel(i, now, ground, command, m, p, q):  # type: ignore[no-untyped-def]
         ) / q.inertia
     m.f[ANGLE + i] = m.y[OMEGA + i]
     _jacobian(i, m, F_x, roll, slips, stiff, wet.contact, balance, p, q)
+    out = m.out
     if m.is_recorded > 0.0:
-        out = m.out
-        _record(i, out, roll, ground, wet, balance, stiff.slope)
         out[AT.omega + i] = m.y[OMEGA + i]
-        out[AT.twist + i] = m.y[TWIST + i]
         out[AT.angle + i] = m.y[ANGLE + i]
+        out[AT.torque + i] = balance.torque - balance.braking * balance.rim_turn
+    if m.is_detailed > 0.0:
+        _record(i, out, roll, ground, wet, balance, stiff.slope)
+        out[AT.twist + i] = m.y[TWIST + i]
         out[AT.F_x + i] = F_x
         out[AT.F_y + i] = F_y
         out[AT.s_x + i] = slips.s_x
-        out[AT.v_full + i] = wet.v_full * max(q.contact_gain, 1e-30) ** (-1.0 / q.contact_exponent)
+        out[AT.v_full + i] = wet.v_full
+        if q.contact_gain != 1.0:
+            out[AT.v_full + i] *= max(q.contact_gain, 1e-30) ** (-1.0 / q.contact_exponent)
         if i < 2:
             half = _half_length(ground.F_z, q.p, q.half_length, F_Z_HALF_LENGTH, P_HALF_LENGTH)
             out[AT.aligning + i] = _aligning_moment(
@@ -316,7 +320,7 @@ def _water(roll, ground, scatter, q):  # type: ignore[no-untyped-def]
 
 @part
 def _stiffness(now, ground, q):  # type: ignore[no-untyped-def]
-    drifted = np.exp(min(max(q.slip_slope_drift * now.t, -3.0), 3.0))
+    drifted = np.exp(min(max(q.slip_slope_drift * now.t, -3.0), 3.0)) if q.slip_slope_drift != 0.0 else 1.0
     slope = q.slip_slope * (1.0 + q.leak_slope * now.leak) * drifted
     slope = _series_slope(slope * _load_factor(ground.F_z, q.F_z_ref, q.load_sensitivity), ground.compliance)
     across = _series_slope(q.cornering_slope, ground.compliance)
@@ -404,7 +408,6 @@ def _on_body(i, now, roll, along, F_y):  # type: ignore[no-untyped-def]
 def _record(i, out, roll, ground, wet, balance, slope):  # type: ignore[no-untyped-def]
     out[AT.tread_omega + i] = roll.omega
     out[AT.climb + i] = ground.climb
-    out[AT.torque + i] = balance.torque - balance.braking * balance.rim_turn
     out[AT.F_z + i] = ground.F_z
     out[AT.slip_angle + i] = -np.arctan2(roll.across, max(abs(roll.along), 0.5))
     out[AT.contact + i] = wet.contact

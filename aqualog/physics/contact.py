@@ -12,14 +12,9 @@ import numpy as np
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "contact_half_length",
-    "contact_share",
-    "friction_ratio",
-    "load_shift",
-    "lost_contact",
-    "remaining_share",
+    "contact_half_length", "contact_share", "friction_ratio", "load_shift", "lost_contact", "remaining_share",
     "slip_stiffness_ratio",
-]
+]  # fmt: skip
 
 
 def remaining_share(b: FloatArray, a: FloatArray) -> FloatArray:

@@ -12,14 +12,9 @@ from aqualog.core.records import FloatArray
 from aqualog.physics.slip import V_MIN
 
 __all__ = [
-    "beta_of_ratio",
-    "differential_slip",
-    "differential_traction",
-    "jacobian",
-    "predicted_differential_slip",
-    "slope_ratio",
-    "speed_ratio",
-]
+    "beta_of_ratio", "differential_slip", "differential_traction", "jacobian", "predicted_differential_slip",
+    "slope_ratio", "speed_ratio",
+]  # fmt: skip
 
 
 def differential_slip(v_i: FloatArray, v_j: FloatArray) -> FloatArray:

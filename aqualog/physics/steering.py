@@ -171,12 +171,7 @@ def held_angle(rack: FloatArray, free: FloatArray, *, friction: float, per_force
 
 
 def tie_rod_force(
-    F_x: FloatArray,
-    F_y_outward: FloatArray,
-    *,
-    c0: Sequence[float],
-    c_y: Sequence[float],
-    c_x: Sequence[float],
+    F_x: FloatArray, F_y_outward: FloatArray, *, c0: Sequence[float], c_y: Sequence[float], c_x: Sequence[float]
 ) -> FloatArray:
     """Tie-rod force of one front wheel by a polynomial transfer function.
 

@@ -7,14 +7,8 @@ import numpy as np
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "brush_force",
-    "brush_forces",
-    "brush_parts",
-    "brush_slip",
-    "brush_slope",
-    "brush_stiffness",
-    "sliding_edge",
-]
+    "brush_force", "brush_forces", "brush_parts", "brush_slip", "brush_slope", "brush_stiffness", "sliding_edge",
+]  # fmt: skip
 
 
 def brush_stiffness(c_px: FloatArray, a: FloatArray) -> FloatArray:
@@ -113,14 +107,7 @@ def brush_force(s_x: FloatArray, F_z: FloatArray, *, mu: float, C_s: float, L: F
 
 
 def brush_forces(
-    s_x: FloatArray,
-    s_y: FloatArray,
-    F_z: FloatArray,
-    *,
-    mu: float,
-    C_x: float,
-    C_y: float,
-    L: FloatArray | float = 1.0,
+    s_x: FloatArray, s_y: FloatArray, F_z: FloatArray, *, mu: float, C_x: float, C_y: float, L: FloatArray | float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
     """Longitudinal and lateral force of the brush tyre under combined slip.
 

@@ -7,6 +7,7 @@ and each kind of dry drive, says how likely that is; what is dry is learnt from 
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -188,7 +189,7 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
         w[i] /= total
 
 
-@part
+@partial(part, allocates=True)
 def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
     """Let the window speak: probabilities of the kinds of road, evidence on the full speeds."""
     z = np.array([1.0, math.log(v / 30.0), math.asinh(traction / 0.02)])

@@ -18,16 +18,7 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.detector import (
-    Found,
-    Needs,
-    Output,
-    Scene,
-    Setup,
-    missing_torques,
-    missing_wheels,
-    too_slow,
-)
+from aqualog.detect.detector import Found, Needs, Output, Scene, Setup, missing_torques, missing_wheels, too_slow
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = ["MIN_RATE", "WholeDrive", "alarm_bits", "needs_slip", "needs_wheels"]

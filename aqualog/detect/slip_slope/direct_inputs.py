@@ -267,8 +267,7 @@ def _traction(vehicle: Vehicle, have: set[str], traction: str, where: str) -> tu
     torque = [f"torque_{w}" for w in vehicle.driven if f"torque_{w}" not in have]
     if traction == "accelerometer" and is_awd:
         raise ConfigError(
-            "--traction accelerometer: it does not show how much of the force each driven axle has",
-            expected="torque",
+            "--traction accelerometer: it does not show how much of the force each driven axle has", expected="torque"
         )
     if traction == "torque" or (traction == "auto" and (not torque or is_awd)):
         if torque:
