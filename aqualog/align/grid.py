@@ -17,8 +17,8 @@ from aqualog.core.records import BoolArray, FloatArray, TimeArray
 from aqualog.core.vehicle import Vehicle
 
 __all__ = [
-    "MAX_ROWS", "Grid", "Placed", "bin_mean", "columns_of", "common_clock", "gap_limit_ns", "grid_of", "hold",
-    "linear", "median_period_ns", "missing_samples", "onto_grid", "placed",
+    "MAX_ROWS", "Grid", "Placed", "between_samples", "bin_mean", "columns_of", "common_clock", "gap_limit_ns", "grid_of",
+    "hold", "linear", "median_period_ns", "missing_samples", "onto_grid", "placed",
 ]  # fmt: skip
 
 
@@ -153,6 +153,7 @@ def bin_mean(
 
 MAX_ROWS = 60_000_000
 _SPARSE_ROWS = 1_000_000  # beyond, a grid with one sample in 50 points is a jump of the time stamps, not a drive
+_PHASES = 1000  # points of a drive at which a grid is compared with stamps
 _NICE_HZ = (1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 80, 100, 125, 200, 250, 400, 500, 1000)
 
 
@@ -280,6 +281,16 @@ def missing_samples(span: Span, grid: Grid) -> float:
         return 0.0
     expected = grid.rows * grid.dt_ns / span.mean_period_ns
     return min(max(0.0, 1.0 - span.samples / expected), 1.0)
+
+
+def between_samples(span: Span, grid: Grid) -> float:
+    """Return the mean of phi (1 - phi) over the grid, see `core.records.Origin`; 0 for means over bins."""
+    period = span.mean_period_ns
+    if not period or span.period_ns < grid.dt_ns / 2:
+        return 0.0
+    point = np.arange(min(grid.rows, _PHASES), dtype=np.int64) * max(1, grid.rows // _PHASES)
+    phi = ((grid.start_ns - span.first_ns + point * grid.dt_ns) % period) / period
+    return float((phi * (1.0 - phi)).mean())
 
 
 def columns_of(symbol: Symbol, y: FloatArray, vehicle: Vehicle) -> list[tuple[str, pl.Series]]:

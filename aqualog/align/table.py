@@ -13,6 +13,7 @@ from aqualog.align.freezes import SPEEDS, dead_speeds, standing_by, while_moving
 from aqualog.align.grid import (
     MAX_ROWS,
     Grid,
+    between_samples,
     columns_of,
     common_clock,
     gap_limit_ns,
@@ -166,9 +167,10 @@ class Plan:
         origins: dict[str, Origin] = {}
         for clean in self.cleaned:
             seen = missing_samples(clean.span, self.grid) if clean.origin.symbol in bridged else 0.0
+            between = between_samples(clean.span, self.grid)
             for name, _ in columns_of(clean.symbol, np.zeros(0), self.vehicle):
                 share = max(missing[name] / self.grid.rows, seen)
-                origins.setdefault(name, replace(clean.origin, symbol=name, missing_fraction=share))
+                origins.setdefault(name, replace(clean.origin, symbol=name, missing_fraction=share, between=between))
         ordered = {n: origins[n] for n in SYMBOLS if n in origins}
         quality = quality_of(self.cleaned, faults, [*self.notes, *missing_notes(ordered.values())])
         empty = self._signals(pl.DataFrame({"t": pl.Series([], dtype=pl.Float64)}))

@@ -70,10 +70,8 @@ def with_elements(arena: Arena) -> Arena:
         own = [s for s in sought if (name,) in s[0].over]
         keys = [(m.name, name) for m, _, _ in own]
         weights, scores = np.array([s[1] for s in own]), np.array([s[2] for s in own])
-        waves = _waves(name, along[name], weights, scores, used)
-        return dict(zip(keys, waves, strict=True)), dict(
-            zip(keys, _patches(name, along[name], weights, scores), strict=True)
-        )
+        waves, patches = _waves(name, along[name], weights, scores, used), _patches(name, along[name], weights, scores)
+        return dict(zip(keys, waves, strict=True)), dict(zip(keys, patches, strict=True))
 
     looked = beside(over, along)
     waves, patches = ({k: v for each in looked for k, v in each[i].items()} for i in range(2))

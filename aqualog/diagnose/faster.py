@@ -17,6 +17,7 @@ from aqualog.diagnose.full_rate import LEVEL, Kind, PerTurn, Z, per_turn, wheel_
 from aqualog.diagnose.outcome import Outcome
 from aqualog.diagnose.records import SURE, Cause, Estimate, Verdict
 from aqualog.diagnose.seams import seams
+from aqualog.diagnose.search import DOUBT
 from aqualog.diagnose.words import cause_sentence, place
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
@@ -115,6 +116,7 @@ def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
     for where, pair in out:
         mean = float(np.mean([f.amplitude for f in pair]))
         half = 0.5 * math.sqrt(sum((f.high - f.low) ** 2 for f in pair)) / len(pair)
+        half = math.hypot(half, Z * DOUBT * mean)  # filters of control units and loggers
         value = Estimate(mean, max(mean - half, 0.0), mean + half, effect.parameters[0].unit)
         parameters = {effect.parameters[0].name: value}
         channels = tuple(f"omega_{f.wheel}" for f in pair)

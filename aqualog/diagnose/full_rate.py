@@ -71,12 +71,13 @@ class _Wheel(NamedTuple):
     """A wheel speed at its own step: mean and relative rest (m,), weight 1 / variance of the rest, angle [turns].
 
     `rate` [Hz]: at which the bus has it; `lines`: time between samples that straight lines connect, else 0. [s]
-    `rounding` (m,): share of that variance that comes from the steps of the signal.
+    `between`: as in `Origin`; `rounding` (m,): share of that variance that comes from the steps of the signal.
     """
 
     dt: float
     rate: float
     lines: float
+    between: float
     mean: FloatArray
     rest: FloatArray
     weight: FloatArray
@@ -133,8 +134,9 @@ def per_turn(
 
     The angle is the integral of the wheel speed itself, so delays do not matter. Its noise makes the angle drift: sums
     over the whole drive and over 512, 64 and 16 turns compete. A control unit averages over nothing up to the period of
-    its reports: the interval covers both. Limits: a tyre that runs out of true looks like a ring; a speed that is
-    rounded without noise hides what is smaller than half a step.
+    its reports: the interval covers both. What lines between samples and grid take is put back. Limits: a tyre that
+    runs out of true looks like a ring; a speed that is rounded without noise hides what is smaller than half a step; a
+    logger that put all channels on one time base has taken a part of the amplitude with it.
     """
     found = []
     for w in WHEELS:
@@ -166,6 +168,7 @@ def _prepared(x: FloatArray, dt: float, origin: Origin | None) -> _Wheel | str:
         x, dt = x[first::held], held * dt
     rate = 1.0 / dt
     lines = 0.0
+    between = origin.between if origin is not None and held <= 1 else 0.0  # held samples are taken as they are
     if origin is not None and 0.0 < origin.rate_hz < 0.8 * rate:
         rate = origin.rate_hz
         lines = 1.0 / rate
@@ -186,7 +189,7 @@ def _prepared(x: FloatArray, dt: float, origin: Origin | None) -> _Wheel | str:
     beside = round(0.5 * SPEED_S / dt)
     edge = np.convolve(np.pad(missing, beside, constant_values=True), np.ones(2 * beside + 1), "valid") > 0.5
     weight = np.where(good & ~edge & (mean > 1e-3), safe**2 / variance, 0.0)
-    return _Wheel(dt, rate, lines, mean, (filled - mean) / safe, weight, turns, rounding / variance)
+    return _Wheel(dt, rate, lines, between, mean, (filled - mean) / safe, weight, turns, rounding / variance)
 
 
 def _tested(wheel: _Wheel, order: int, slack: float) -> PerTurn | str:
@@ -196,10 +199,13 @@ def _tested(wheel: _Wheel, order: int, slack: float) -> PerTurn | str:
         if not ((wheel.weight > 0.0) & (f > LEAST_HZ)).any():
             return f"no wheel turns faster than {LEAST_HZ:g} times a second"
         return f"wheel speeds at {wheel.rate:.3g} Hz are too slow for one turn of a wheel at the speeds of the drive"
-    part = _Wheel(wheel.dt, wheel.rate, wheel.lines, *(a[used] for a in wheel[3:]))
+    part = _Wheel(wheel.dt, wheel.rate, wheel.lines, wheel.between, *(a[used] for a in wheel[4:]))
     f = f[used]
-    # share of the amplitude that is left: no window or the whole period of the reports, and what the mean took
+    # share of the amplitude that is left: no window or the whole period of the reports, and what the mean took and the
+    # lines between samples
     most = (1.0 - _hann_gain(f, wheel.dt)) * np.sinc(f * wheel.lines) ** 2
+    if wheel.lines == 0.0:
+        most *= np.sqrt(1.0 - 2.0 * wheel.between * (1.0 - np.cos(2.0 * np.pi * f * wheel.dt)))
     least = most * np.sinc(f * max(1.0 / wheel.rate, wheel.dt))
     gain = 0.5 * (least + most)
     best = _best(part, order, gain, slack)

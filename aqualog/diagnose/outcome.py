@@ -16,7 +16,7 @@ from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.judge import repeats
 from aqualog.diagnose.records import SURE, Alternative, Cause, Estimate, Verdict, tempered
 from aqualog.diagnose.refit import Refit
-from aqualog.diagnose.search import Found, Option, sharpened
+from aqualog.diagnose.search import DOUBT, Found, Option, sharpened
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence
@@ -141,7 +141,11 @@ def _linear(arena: Arena, posterior: Posterior, members: Members, model: Model) 
 def _cause(
     h: Hypothesis, values: FloatArray, off: FloatArray, sd: FloatArray, explains: tuple[str, ...]
 ) -> tuple[Cause, bool]:
-    """A cause, and whether a value reaches its smallest size and its interval excludes zero effect."""
+    """A cause, and whether a value reaches its smallest size and its interval excludes zero effect.
+
+    An interval also covers that the car's response to the effect is up to a few per cent off the simulator's.
+    """
+    sd = np.hypot(sd, DOUBT * off)
     parameters, large = {}, False
     for name, x, change, s in zip(h.free, values.tolist(), off.tolist(), sd.tolist(), strict=True):
         p = h.parameter(name)

@@ -40,7 +40,8 @@ COVERED, REFITTED = 0.98, 6  # share of the posterior that is refitted, and the 
 # share of the best set's gain by which the form of a water law may have misjudged another effect of water
 FORM = 0.3
 NEAR = 10.0  # [nats] behind the best set, within which a single effect is refitted
-DOUBT = 0.05  # share of what an effect shows that a channel may show more or less than in the simulator (K)
+# share of what an effect shows that a channel may show more or less than in the simulator, and an interval allows (K)
+DOUBT = 0.05
 # share of what a set explains, by which a simulator of other structure errs: one more effect has to explain more (K)
 STRUCTURE = 0.01
 HALF = 0.5  # probability from which a slope or bank of the road is marginalised

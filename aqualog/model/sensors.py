@@ -139,14 +139,7 @@ def measure(truth: Truth, sensors: Sensors, *, rate_hz: float, seed: int) -> lis
     return [g for g in (*groups, Measured("truth", _sample_times(truth, rate_hz), known)) if g.columns]
 
 
-def _measure_group(
-    truth: Truth,
-    sensors: Sensors,
-    group: Group,
-    rate_hz: float,
-    seed: int,
-    seen_at: Callable[[float, Channel], _Places],
-) -> Measured:
+def _measure_group(truth: Truth, sensors: Sensors, group: Group, rate_hz: float, seed: int, seen_at: _Seen) -> Measured:
     at = _sample_times(truth, rate_hz)
     columns = {}
     for name in group.signals:
@@ -217,6 +210,9 @@ def _rolling(truth: Truth, sensors: Sensors, name: str, seed: int) -> FloatArray
 def _angle(truth: Truth, name: str) -> FloatArray:
     angle = name.replace("omega", "angle")
     return _column(truth, angle) if angle in truth.columns else rolled_angle(_column(truth, name), dt=_step(truth))
+
+
+_Seen = Callable[[float, Channel], "_Places"]  # where a rate and a channel look into the fine grid
 
 
 class _Places(NamedTuple):

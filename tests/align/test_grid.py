@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from aqualog.align.grid import bin_mean, common_clock, gap_limit_ns, hold, linear, placed
+from aqualog.align.clean import Span
+from aqualog.align.grid import Grid, between_samples, bin_mean, common_clock, gap_limit_ns, hold, linear, placed
 from aqualog.align.mapping import SignalMap
 from aqualog.core.errors import SignalError
 
@@ -18,6 +19,17 @@ def test_linear_is_exact_on_a_line_at_epoch_times():
     y, bridged = linear(t, np.arange(11.0), grid(101), gap_ns=500 * MS)
     assert y == pytest.approx(np.arange(101) / 10.0, abs=1e-12)
     assert not bridged.any()
+
+
+def test_how_far_the_grid_lies_between_the_samples():
+    def of(late, period=10 * MS):
+        first = EPOCH + round(late * period)
+        return between_samples(Span(first, first + 999 * period, 1000, period, period), Grid(EPOCH, 1000, 10 * MS))
+
+    assert of(0.0) == 0.0
+    assert of(0.25) == pytest.approx(0.25 * 0.75)
+    assert of(0.0, 10 * MS + 30_000) == pytest.approx(1.0 / 6.0, abs=1e-3)  # three samples behind in the end
+    assert of(0.3, 2 * MS) == 0.0  # means
 
 
 def test_no_extrapolation():

@@ -55,9 +55,6 @@ def without_losses(car):
     )  # fmt: skip
 
 
-# mechanics
-
-
 @pytest.mark.nightly
 def test_nothing_is_lost_or_won_without_losses():
     x = ride(without_losses(car_of()[0]), steady(25.0), coast=True)
@@ -143,9 +140,6 @@ def test_a_step_of_half_the_length_changes_nothing_that_counts():
     assert x["v_x"][-1] == pytest.approx(expected, rel=2e-3)
 
 
-# sensors
-
-
 def test_edges_give_the_speed():
     angle = np.cumsum(np.full(500, 0.37)) + 1.0
     assert np.allclose(edges(angle, np.zeros(TEETH))[2:], 37.0, rtol=1e-9)
@@ -175,9 +169,6 @@ def test_ideal_sensors_see_the_balance_of_the_vehicle_file(monkeypatch):
         assert np.sqrt(np.mean(r["force_balance"] ** 2)) < 0.012
         assert abs(np.mean(r["kinematic"])) < 0.03
         assert all(abs(np.mean(r[f"slip_{w}"])) < 0.03 for w in WHEELS)
-
-
-# what is hidden
 
 
 def test_kinds_are_the_contracts_and_thirteen_forms_besides():
@@ -233,9 +224,6 @@ def test_odd_forces_are_where_they_say():
     assert force("odd_hours", share=0.05, force=50.0) == pytest.approx(-50.0, rel=0.1)
 
 
-# cases
-
-
 def test_a_case_is_a_function_of_seed_and_number():
     def made(number):
         return make_case(draw_plan(5, number, "compound", duration_s=10.0), z_least=0.0)
@@ -287,9 +275,6 @@ def measure_one(error):
         rows[:, ROWS[f"angle_{w}"]] = 50.0 * np.arange(2000) * DT
     messages = measure(rows, car_of()[0], {"omega_fl": error}, "white", np.random.default_rng(1))
     return next(m for m in messages if m.name == "wheels").columns["omega_fl"][10:]
-
-
-# sealed
 
 
 @pytest.fixture(scope="module")

@@ -322,9 +322,6 @@ def test_compiling_is_told_only_where_it_takes_long(monkeypatch, capsys):
     assert "compiling" in capsys.readouterr().err
 
 
-# campaigns
-
-
 @pytest.fixture
 def campaign(monkeypatch):
     calls = []

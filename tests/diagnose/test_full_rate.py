@@ -1,6 +1,7 @@
 """What repeats per turn of a wheel: found at the log's rate, with its size, and nothing where nothing is."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -217,7 +218,7 @@ def test_causes_by_wheel_axle_and_side():
     assert [(c.effect, c.where, c.explains) for c in one] == [("tone_ring", "fl", ("omega_fl",))]
     assert one[0].parameters["amplitude"].value == pytest.approx(3e-3)
     assert one[0].sentence == (
-        "The tone ring of the wheel is uneven by 0.30% (front left wheel); 95 % interval 0.290 to 0.310 %."
+        "The tone ring of the wheel is uneven by 0.30% (front left wheel); 95 % interval 0.27 to 0.33 %."
     )
     assert [c.where for c in to_causes([answer("fl", 3e-3), answer("fr", 3.1e-3)])] == ["f"]
     assert [c.where for c in to_causes([answer("fl", 3e-3), answer("rl", 3e-3)])] == ["left"]
@@ -225,6 +226,14 @@ def test_causes_by_wheel_axle_and_side():
     assert to_causes([answer("fl", 1e-3)]) == ()
     assert "too little to be worth naming" in remarks([answer("fl", 1e-3)])[0]
     assert "runs out of true" in remarks([answer("fl", 3e-3)])[-1]
+
+
+def test_a_line_between_samples_takes_what_is_put_back():
+    columns = drive(uneven={"fl": ring(2e-3)}, low=25.0, high=35.0)
+    halfway = {n: 0.5 * (x[1:] + x[:-1]) for n, x in columns.items()}
+    assert found(halfway)["fl", 1].high < 2e-3
+    known = found(halfway, of={n: replace(o, between=0.25) for n, o in origins().items()})["fl", 1]
+    assert known.low <= 2e-3 <= known.high
 
 
 def test_half_a_second_of_a_drive_of_five_minutes():

@@ -109,9 +109,6 @@ def test_a_case_is_the_same_after_it_was_written_down(name):
         assert case_of(own.line() + "  # a remark").data == own.data
 
 
-# that the judges see what they should see
-
-
 def test_a_reader_that_says_another_thing_in_pieces_is_seen(monkeypatch):
     data = csv_seeds()["point"]
     whole = readers.outcome(data, "a.csv")
@@ -239,9 +236,6 @@ def test_a_process_that_ends_or_stands_still_is_told_with_its_case(monkeypatch, 
         if what == "end":
             total = watch.watched("csv", 0.3, 1, guided=False, may_end=True, tell=lines.append)
             assert total["wrong"] == 0 < total["ended"]
-
-
-# the command
 
 
 def test_help_names_all_targets_and_has_examples(capsys):

@@ -187,9 +187,6 @@ def test_metadata_of_others(stored):
         assert channels["v"].info.unit == "bar"
 
 
-# parts of a file
-
-
 def in_pieces(path, size, monkeypatch, **options):
     monkeypatch.setattr(parquet, "_PIECE", size)
     with ParquetReader(path, ReadOptions(**options)) as reader:
