@@ -17,8 +17,8 @@ from aqualog.core.records import BoolArray, FloatArray, TimeArray
 from aqualog.core.vehicle import Vehicle
 
 __all__ = [
-    "MAX_ROWS", "Grid", "Placed", "between_samples", "bin_mean", "columns_of", "common_clock", "gap_limit_ns", "grid_of",
-    "hold", "linear", "median_period_ns", "missing_samples", "onto_grid", "placed",
+    "MAX_ROWS", "Grid", "Placed", "between_samples", "bin_mean", "columns_of", "common_clock", "gap_limit_ns",
+    "grid_of", "hold", "linear", "median_period_ns", "missing_samples", "onto_grid", "placed",
 ]  # fmt: skip
 
 
