@@ -22,6 +22,7 @@ from aqualog.diagnose.hypotheses import residual
 from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.shapes import ALONG, Shape, shapes
 from aqualog.diagnose.spectrum import Weighing, weighing
+from aqualog.diagnose.threads import beside
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
 
@@ -284,8 +285,12 @@ def _tolerance(evidence: Evidence, made: Sequence[Shape], blocks: Sequence[Block
 
 def products(rows: npt.NDArray[np.float32]) -> FloatArray:
     """Inner products of single-precision rows, in double precision: else large ones would not be positive definite."""
-    total = np.zeros((len(rows), len(rows)))
-    for i in range(0, rows.shape[1], CHUNK):
+
+    def of(i: int) -> FloatArray:
         x = rows[:, i : i + CHUNK].astype(np.float64)
-        total += x @ x.T
+        return np.asarray(x @ x.T)
+
+    total = np.zeros((len(rows), len(rows)))
+    for part in beside(of, range(0, rows.shape[1], CHUNK)):
+        total += part
     return total

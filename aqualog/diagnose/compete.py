@@ -98,7 +98,7 @@ def compete(arena: Arena, *, rounds: int = ROUNDS) -> Posterior:
 
 def _first(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
     """A set, and the set with each of the blocks that gain most beside it."""
-    return [best, *((*best, m) for m in first_of(arena.blocks, inner, best))]
+    return [best, *((*best, m) for m in first_of(arena.blocks, inner, arena.name, best))]
 
 
 def _deviations(arena: Arena, white: FloatArray) -> _Deviations:

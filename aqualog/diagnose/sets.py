@@ -19,7 +19,7 @@ __all__ = [
 WIDTH = 8
 MOST = 4  # blocks in one set
 SWAPPED = 3  # sets in which every member is exchanged
-FEW = 2  # first candidates of effects and of other blocks each
+FEW_KNOWN, FEW = 3, 2  # first candidates of known effects and of other blocks
 DIES = 6.0  # [nats] behind the best set, at which a level of larger sets ends the search
 SINGULAR = 1e-3  # share of a column's energy that the others of its set must leave
 SMALLEST = 1e-12
@@ -113,15 +113,20 @@ def grouped(names: Sequence[frozenset[str]], share: Sequence[float]) -> Grouped:
     return Grouped(tuple(tuple(g) for g in order), marginal)
 
 
-def first_of(blocks: Sequence[Block], inner: FloatArray, beside: Members = ()) -> list[int]:
-    """The few known effects and the few other blocks that gain most beside a set."""
+def first_of(
+    blocks: Sequence[Block], inner: FloatArray, name: Callable[[int], str], beside: Members = ()
+) -> list[int]:  # fmt: skip
+    """The few known effects, each at its best place, and the few other blocks that gain most beside a set."""
     state = start(inner)
     for m in beside:
         state = added(state, m, blocks[m])
     gains = _gains(state, blocks, packed(blocks), inner)
     order = [i for i in np.argsort(-gains, kind="stable").tolist() if i not in beside and gains[i] > 0.0]
-    known = [i for i in order if blocks[i].kind == "effect"]
-    return [*known[:FEW], *[i for i in order if blocks[i].kind != "effect"][:FEW]]
+    known: dict[str, int] = {}
+    for i in order:
+        if blocks[i].kind == "effect":
+            known.setdefault(name(i), i)
+    return [*list(known.values())[:FEW_KNOWN], *[i for i in order if blocks[i].kind != "effect"][:FEW]]
 
 
 def searched(

@@ -42,6 +42,9 @@ from aqualog.physics.load import G
 __all__ = ["Controls", "integrate", "run"]
 
 NO_TORQUE: FloatArray = np.zeros((1, 4))
+# a car that is followed stands where the measured one stands: a driver holds it on a slope, with a force that no log
+# has, and what a rolling start differs by would last for seconds
+SLOW, AT_REST = 3.0, 15.0  # [m/s] below it the speed is drawn harder, at rest by so many times
 
 
 class Controls(NamedTuple):
@@ -173,7 +176,8 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
     # specific force: what an accelerometer shows; a trailer is pulled along
     a_x = (sum_x - drag) / (p.mass + p.towed_mass)
     a_y = sum_y / p.mass
-    nudge = p.follow * (c.v_target - y[V_X])
+    slow = max(1.0 - c.v_target / SLOW, 0.0)
+    nudge = p.follow * (1.0 + AT_REST * slow * slow) * (c.v_target - y[V_X])
     _move(m, a_x, a_y, slope_down / p.mass, moment / p.I_zz, nudge, p.roll_time)
     out = m.out
     if m.is_recorded > 0.0:
