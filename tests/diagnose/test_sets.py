@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aqualog.diagnose.competition import Block
-from aqualog.diagnose.sets import evidence_of, fitted_in, grouped, ranked, searched
+from aqualog.diagnose.sets import evidence_of, first_of, fitted_in, grouped, ranked, searched
 from aqualog.diagnose.unexplained import clear_forms
 
 RNG = np.random.default_rng(5)
@@ -39,6 +39,12 @@ def test_search_finds_the_set_and_its_values():
     assert found.probability.sum() == pytest.approx(1.0)
     assert found.marginal["b1"] > 0.99
     assert fitted_in(BLOCKS, 4.0 * G, found.best).mean == pytest.approx([1.0, -0.7], abs=0.1)
+
+
+def test_first_candidates_are_different_effects():
+    G = inner(X @ [1.0, 0.9, 0.8, 0.7, 0.0, 0.0])
+    assert first_of(BLOCKS, G, lambda i: "ab"[i // 2]) == [0, 2]
+    assert first_of(BLOCKS, G, lambda i: str(i), (0,)) == [1, 2, 3]
 
 
 def test_a_block_that_may_not_join_does_not():

@@ -80,6 +80,14 @@ def test_the_nudge_is_rate_times_what_is_missing(made):
     np.testing.assert_allclose(shown["nudge"], 0.2 * (c["v_x"] + 1.0 - shown["v_x"]), atol=5e-3)
 
 
+def test_a_car_stands_on_a_slope_where_the_measured_one_stands():
+    t = np.arange(4000) * 0.01
+    v = np.interp(t, (0.0, 10.0, 20.0, 30.0), (10.0, 0.0, 0.0, 10.0))
+    torque = np.tile(0.25 * CAR.mass * np.gradient(v, 0.01) * CAR.arm("fl"), (4, 1))
+    shown = follow(CAR, Course(t, torque, 0.0 * t, v), Model((term("road_grade", grade=0.05),)))
+    assert np.abs(shown["v_x"][1500:2000]).max() < 0.2
+
+
 @pytest.mark.parametrize("delay", [0.2, -0.1])
 def test_a_torque_that_is_reported_late_is_applied_earlier(made, delay):
     t, c = made
