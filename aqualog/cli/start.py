@@ -13,6 +13,9 @@ __all__ = ["run"]
 def run() -> None:
     """Entry point of the installed command."""
     open_streams()
+    # commands have threads and processes of their own, in which those of a product of matrices wait for each other
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     try:
         from aqualog.cli.main import run as begin
 

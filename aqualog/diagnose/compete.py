@@ -23,7 +23,7 @@ ROUGHLY = 2  # sets that are carried on while the noise is sought
 ROUNDS = 4  # of noise, each after what the one before has found
 PAIRS, SEED = 2, 20  # of draws of a set's values
 CLEARLY = 1.0  # [nats] that a noise must make the measurement more likely
-NEGLIGIBLE = 0.03  # variance, in units of white noise's, of a direction of the tolerances that is left out
+NEGLIGIBLE = 0.3  # variance, in units of white noise's, of a direction of the tolerances that is left out
 
 
 @dataclass(frozen=True, slots=True)

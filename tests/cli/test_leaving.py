@@ -103,6 +103,16 @@ def test_interrupted(tmp_path, command, told, number):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "car.toml"]
 
 
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_a_product_of_matrices_takes_one_thread_or_what_the_user_says(monkeypatch, threads):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if threads != "1":
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", threads)
+    code = "import atexit, os, sys\nfrom aqualog.cli.start import run\nsys.argv = ['aqualog', '--version']\n"
+    code += "atexit.register(lambda: print(os.environ['OPENBLAS_NUM_THREADS']))\nrun()"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout.split()[-1] == threads
+
+
 @pytest.mark.parametrize("code", [CALLED_BACK, LOADING, STARTING], ids=["called back", "loading", "starting"])
 def test_interrupted_where_python_alone_would_lose_it_or_show_where(code):
     with subprocess.Popen([sys.executable, "-c", code], text=True, stderr=subprocess.PIPE) as process:

@@ -26,9 +26,6 @@ from tests.fuzz.settings_files import LOG, NAMES, check_error, check_finite, dri
 _SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs"
 
 
-# signal map
-
-
 @cache
 def maps() -> dict[str, bytes]:
     """Maps of the drive: short, with every key, and with several channels for a signal."""
@@ -69,9 +66,6 @@ def _check_signals(signals: Signals) -> None:
         assert not np.isinf(np.asarray(x, dtype=float)).any(), f"{symbol} is infinite"
 
 
-# vehicle
-
-
 @cache
 def vehicles() -> dict[str, bytes]:
     """The sample's, one with every key, and a bare one."""
@@ -107,9 +101,6 @@ def _detect(car: Vehicle, settings: Settings) -> None:
         assert event.start_s <= event.end_s, "an event that ends before it begins"
 
 
-# thresholds
-
-
 @cache
 def thresholds() -> dict[str, bytes]:
     """With every key, and a few."""
@@ -133,9 +124,6 @@ def threshold(data: bytes) -> None:
     _detect(Vehicle(), settings)
 
 
-# labels
-
-
 def labels() -> dict[str, bytes]:
     """With all columns, without wheels, and without lines."""
     all_of = "start_s,end_s,effect,wheel\n0.5,2.5,full,fl\n1,3,water,\n2.0,2.25,spin_down,rr\n2,4,aquaplaning,\n3,3.5,snow,fr\n"
@@ -157,9 +145,6 @@ def label(data: bytes) -> None:
         ends[x.effect, x.wheel] = x.end_s
     count = max(data.count(b"\n"), data.count(b"\r")) + 1
     assert len(found or ()) <= 2 * count, "more labels than lines"
-
-
-# history
 
 
 def histories() -> dict[str, bytes]:
