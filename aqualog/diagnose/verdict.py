@@ -115,13 +115,13 @@ def decided(
         ratio = math.exp(min(max(group[0].evidence - g[0].evidence, 0.0), 700.0))
         rivals.append((picked, sum(s.share for s in g)))
         others.append(Alternative(_with_probability(picked.large, together.marginal), ratio))
-    shown = {c.effect: c for a in reversed(others) for c in a.causes} | {c.effect: c for c in own}
-    names = [c.effect for c in own] + [n for n in shown if n not in best.names]
     certain = frozenset() if failed else best.names - unsure
-    ordered = sorted(names, key=lambda n: n not in certain)
+    # the best set whole, one effect at two places too; of the others what it does not have
+    more = {c.effect: c for a in reversed(others) for c in a.causes if c.effect not in best.names}
+    shown = sorted([*own, *more.values()], key=lambda c: c.effect not in certain)
     notes += tuple(f"Not named: {reason}" for reason in failed)
     return Decision(
-        "cannot_tell", tuple(shown[n] for n in ordered), tuple(others), best, group, certain,
+        "cannot_tell", tuple(shown), tuple(others), best, group, certain,
         tuple((s, q / total) for s, q in rivals), notes,
     )  # fmt: skip
 

@@ -32,6 +32,11 @@ def test_close_sets_are_listed_until_they_hold_the_posterior():
     assert sum(q for _, q in found.rivals) == pytest.approx(1.0)
 
 
+def test_one_effect_at_two_places_is_listed_at_both():
+    found = verdict([([cause("drag", "f"), cause("drag", "r")], 0.0), ([cause("slope")], -1.0), ([], -40.0)])
+    assert [c.key for c in found.causes] == ["drag@f", "drag@r", "slope"]
+
+
 def test_the_same_names_at_other_places_count_together():
     found = verdict([([cause("drag", "f")], 0.0), ([cause("drag", "r")], -0.5), ([cause("slope")], -15.0)])
     assert found.verdict == "named"
