@@ -74,7 +74,7 @@ def follow(
         Its terms act on car, road and sensors. The effect of a term on the sensors of torque, steering and velocity
         is undone before they drive the simulation: a torque that is reported late is applied earlier.
     rate : float
-        Rate at which the speed is drawn to the measured one. [1/s] 0: it runs free from the first speed on.
+        Rate at which the speed is drawn to the measured one, 16 times that at rest. [1/s] 0: it runs free.
     step : float
         Step of the integration, at most 10 ms. [s]
 

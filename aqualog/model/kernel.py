@@ -69,7 +69,7 @@ class Controls(NamedTuple):
     kicks: bool = False  # the road has kerbs or holes
     is_uneven: bool = False  # the road has heights
     steering_friction: float = 0.0  # [N] of the rack
-    follow: float = 0.0  # [1/s] without a driver: how fast the speed is drawn to `v_target`; 0: runs free
+    follow: float = 0.0  # [1/s] without a driver: how fast the speed is drawn to `v_target`, see `SLOW`; 0: free
     motion_only: bool = False  # the first `MOTION_WIDTH` columns are recorded, the others not
 
 
