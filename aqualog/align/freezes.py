@@ -28,6 +28,7 @@ __all__ = [
     "Stretch",
     "dead_speeds",
     "freeze_note",
+    "limits_of",
     "longest_stop",
     "stand_watch_of",
     "standing_by",
@@ -47,6 +48,8 @@ SPEEDS = ("v_x", "omega_fl", "omega_fr", "omega_rl", "omega_rr")
 
 _SPEED = (3.0, 2.0, 0.03)  # least time [s]; speed below which a car counts as standing, coarsest step [m/s]
 _TORQUE = (60.0, 0.0, np.inf)  # [s], [N*m], [N*m]
+_BODY = (10.0, -1.0, np.inf)  # accelerations and yaw rate, which may stand at zero too
+_OF_BODY = ("a_x", "a_y", "yaw_rate")
 _MOST_BETWEEN = 0.3  # [s] mean time between two changes of a signal that is judged
 _TIMES_LONGER = 20  # than that time
 _LEAST_CHANGES = 50
@@ -86,7 +89,13 @@ def watch_of(name: str, r_e: float | None) -> FreezeWatch | None:
         return FreezeWatch(*_SPEED)
     if name.startswith("omega_") and r_e is not None:
         return FreezeWatch(_SPEED[0], _SPEED[1] / r_e, _SPEED[2] / r_e, r_e=r_e)
-    return FreezeWatch(*_TORQUE) if name.startswith("torque_") else None
+    limits = limits_of(name)
+    return FreezeWatch(*limits) if limits else None
+
+
+def limits_of(name: str) -> tuple[float, float, float] | None:
+    """Return the limits of a signal that may keep its value while the car stands; None for other signals."""
+    return _BODY if name in _OF_BODY else _TORQUE if name.startswith("torque_") else None
 
 
 class FreezeWatch:
@@ -213,9 +222,9 @@ def longest_stop(t_ns: TimeArray, values: FloatArray, standing: Sequence[Stretch
     return Stop((last - first) * 1e-9, (first - int(t_ns[0])) * 1e-9, float(at[k]), float(moving_s[k]), changes / steps)
 
 
-def while_moving(freezes: Sequence[Freeze], standing: Sequence[Stretch]) -> tuple[Freeze, ...]:
-    """Return the freezes of a torque that last long enough without the time at standstill."""
-    least_ns = round(_TORQUE[0] * 1e9)
+def while_moving(freezes: Sequence[Freeze], standing: Sequence[Stretch], least_s: float) -> tuple[Freeze, ...]:
+    """Return the freezes that last at least `least_s` [s] without the time at standstill."""
+    least_ns = round(least_s * 1e9)
     return tuple((a, b) for a, b in freezes if b - a - standing_ns(a, b, standing) >= least_ns)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from aqualog.align.clean import Clean, Cleaner, Samples, Taken, Unmeasured, corrected, span_of
-from aqualog.align.freezes import SPEEDS, dead_speeds, standing_by, while_moving
+from aqualog.align.freezes import SPEEDS, dead_speeds, limits_of, standing_by, while_moving
 from aqualog.align.grid import (
     MAX_ROWS,
     Grid,
@@ -261,9 +261,9 @@ def plan_drive(
     standing = standing_by(speeds.values())
     unmeasured = {name: cleaner.unmeasured() for name, cleaner in cleaners.items()}
     unmeasured |= {name: Unmeasured((dead,)) for name, dead in dead_speeds(speeds).items()}
-    for name in (n for n in unmeasured if n.startswith("torque_")):
-        own = unmeasured[name]
-        unmeasured[name] = own._replace(frozen=while_moving(own.frozen, standing))
+    for name, own in unmeasured.items():
+        if limits := limits_of(name):
+            unmeasured[name] = own._replace(frozen=while_moving(own.frozen, standing, limits[0]))
     in_part = {name: found[name] for name, own in unmeasured.items() if any(own)}
     if in_part:  # sample times and counts are those without what nobody measured
         again = cleaners_of(in_part, signal_map, vehicle, unmeasured)

@@ -143,9 +143,9 @@ def _cause(
 ) -> tuple[Cause, bool]:
     """A cause, and whether a value reaches its smallest size and its interval excludes zero effect.
 
-    An interval also covers that the car's response to the effect is up to a few per cent off the simulator's.
+    An interval also covers that the car's response to the effect is a few per cent off the simulator's, or its tyre's law.
     """
-    sd = np.hypot(sd, DOUBT * off)
+    sd = np.hypot(sd, math.hypot(DOUBT, h.effect.drive.doubt) * off)
     parameters, large = {}, False
     for name, x, change, s in zip(h.free, values.tolist(), off.tolist(), sd.tolist(), strict=True):
         p = h.parameter(name)

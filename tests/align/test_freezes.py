@@ -89,7 +89,19 @@ def test_torque_may_stay_for_a_minute_and_at_zero():
     assert found(*frozen(t, x, 1000, 8000), "torque_r") == ((t[1000], t[8000]),)
     x[1000:18000] = 0.0
     assert found(t, x, "torque_r") == ()
-    assert watch_of("a_x", None) is None
+    assert watch_of("steering", None) is None
+
+
+@pytest.mark.parametrize("value", [0.0, 0.4])
+@pytest.mark.parametrize("name", ["a_x", "a_y", "yaw_rate"])
+def test_a_sensor_of_the_body_that_stands_still_is_dead_at_zero_too(name, value):
+    t, x = moving(100.0)
+    x = np.round(x - 20.0, 2)
+    x[2000:2900] = value
+    assert found(t, x, name) == ()
+    x[2000:4001] = value
+    assert found(t, x, name) == ((t[2000], t[4000]),)
+    assert found(t, np.round(x, 0), name) == ()  # too coarse to be judged
 
 
 def test_a_single_sample_and_none():
@@ -190,8 +202,8 @@ def test_no_detector_alarms_on_spikes_of_the_accelerometer(height, samples, soun
     assert any("a_x" in n and "(first" in n and "left out" in n for n in result.signals.quality.notes)
 
 
-def stop_and_go(name, is_standing):
-    """Two minutes at a light at which a torque stays the same; or the torque alone stays."""
+def stop_and_go(name, is_standing, steady="torque_r"):
+    """Two minutes at a light at which a signal stays the same; or that signal alone stays."""
     rng = np.random.default_rng(7)
     t = np.arange(40_000) * 0.01
     v = 20.0 * (np.interp(t, [0, 90, 100, 220, 230, 400], [1, 1, 0, 0, 1, 1]) if is_standing else np.ones(t.size))
@@ -201,20 +213,21 @@ def stop_and_go(name, is_standing):
     return {
         name: (t_ns, noisy / (1.0 if name == "v_x" else 0.3)),
         "omega_rr": (t_ns, 66.0 + 0.1 * rng.standard_normal(t.size)),  # told by nothing but itself
-        "torque_r": (t_ns, torque),
+        steady: (t_ns, torque if steady == "torque_r" else torque / 100.0),
     }
 
 
 def in_both_ways(signals):
     """As a whole and in pieces."""
-    units = {"torque_r": "N*m", "v_x": "m/s"}
+    units = {"torque_r": "N*m", "v_x": "m/s", "a_x": "m/s^2"}
     return same([channel(n, t * 1e-9, x, units.get(n, "rad/s")) for n, (t, x) in signals.items()], size=3000, rows=9000)
 
 
 @pytest.mark.parametrize("is_standing", [True, False])
 @pytest.mark.parametrize("name", ["v_x", "omega_fl"])
-def test_a_torque_that_stays_while_the_car_stands(name, is_standing):
-    assert (in_both_ways(stop_and_go(name, is_standing)).quality.frozen_samples == 0) is is_standing
+@pytest.mark.parametrize("steady", ["torque_r", "a_x"])
+def test_a_signal_that_stays_while_the_car_stands(steady, name, is_standing):
+    assert (in_both_ways(stop_and_go(name, is_standing, steady)).quality.frozen_samples == 0) is is_standing
 
 
 @pytest.mark.parametrize("is_parked", [True, False])

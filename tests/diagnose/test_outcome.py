@@ -12,7 +12,9 @@ from aqualog.diagnose.compete import compete
 from aqualog.diagnose.outcome import conclude
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import Found, Option
+from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
+from tests.blind.multibody.tyre import tmeasy
 from tests.diagnose.test_subsets import ASKED, AT, bench_of, waves
 
 S = waves(600, len(ASKED), seed=99) / np.array([h.parameter(h.free[0]).sigma for h in ASKED])[:, None, None]
@@ -184,3 +186,13 @@ def test_what_is_certain_is_not_called_open():
     assert said == "Certain: road grade. This log cannot distinguish the other causes: road grade (mean) or aero drag."
     both = verdict_sentence("cannot_tell", causes[1:], level=0.01)
     assert both == "The car differs from the model, but this log cannot distinguish aero drag and head wind."
+
+
+def test_a_slope_of_the_tyre_is_known_as_well_as_the_form_of_its_curve():
+    def slip(slope):  # where the force is 0.3 of the friction
+        s = np.linspace(0.0, 0.03, 3001)
+        return np.interp(0.3e3, [tmeasy(x, 0.0, 1e3, 1.0, slope, 25.0)[0] for x in s.tolist()], s)
+
+    shown = (slip(28.0) / slip(1.4 * 28.0) - 1.0) / 0.4
+    for name in ("slip_stiffness", "slip_stiffness_drift", "load_sensitivity"):
+        assert EFFECTS[name].drive.doubt == pytest.approx(0.5 * (1.0 - shown), abs=0.01)
