@@ -95,6 +95,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     torque = not any(d.untorqued for d in drives)
     wheels = all(f"omega_{w}" in present for w in WHEELS)
     has: dict[Need, bool] = {"water depth": wet, "wheel torque": torque, "wheel speeds": wheels}
+    has["a_x or wheel torque"] = torque or "a_x" in present
     length = max(d.duration_s for d in drives)
     out: list[Hypothesis] = []
     untested: dict[str, str] = {}

@@ -199,7 +199,7 @@ _ALL = [
         "motorways to 3-4 % (V, DMRB [dmrb2020])",
         (Parameter("grade", "rad", 0.0, 0.02, -0.2, 0.2, 0.002, "slope angle, uphill positive"),), _road_grade,
         twins=("accelerometer_bias",),
-        drive=DriveSearch(turns=True), belongs="drive",
+        drive=DriveSearch(("a_x or wheel torque",), turns=True), belongs="drive",
     ),
     Effect(
         "head_wind", "speed through the air [m/s]", "A head wind of {speed:.1f} m/s blew.", "±5 m/s (K)",

@@ -21,7 +21,7 @@ __all__ = [
 
 Kind = Literal["", "inertia", "drag", "rolling"]  # of the differences between drives of the same car
 Belongs = Literal["car", "tyre", "drive", "moment"]
-Need = Literal["water depth", "wheel torque", "wheel speeds"]
+Need = Literal["water depth", "wheel torque", "wheel speeds", "a_x or wheel torque"]
 
 Knots = tuple[tuple[float, float], ...]
 

@@ -52,7 +52,11 @@ def test_what_has_no_signal_is_not_asked_about():
     assert not {"payload_mass", "aero_drag", "torque_gain", "head_wind"} & keys
     assert untested["payload_mass"] == "no wheel torque in the log"
     assert "stand_in_torque" in keys
-    assert "signal_delay@v_x" in keys
+    assert {"signal_delay@v_x", "road_grade"} <= keys
+    for dropped in (["a_x"], ["a_x", *(f"torque_{w}" for w in WHEELS)]):  # nor is a slope to be seen in it
+        asked, untested = hypotheses([prepare(changed(plain(), plain().frame.drop(dropped)), CAR, "a")], Model())
+        assert untested["road_grade"] == "no a_x or wheel torque in the log"
+        assert "road_grade" not in {h.effect.name for h in asked}
 
 
 def test_slip_and_radius_are_not_asked_about_without_wheel_speeds():

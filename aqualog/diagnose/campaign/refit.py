@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -15,6 +16,7 @@ from aqualog.diagnose.campaign.passes import Passes, expected_values
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.records import Estimate
 from aqualog.diagnose.refit import PRIOR_WIDTH
+from aqualog.diagnose.search import DOUBT
 from aqualog.model.term import Model
 
 __all__ = ["Refit", "estimates", "refit", "settled"]
@@ -159,8 +161,8 @@ def estimates(found: Refit, passes: Passes, weight: FloatArray) -> list[Estimate
     sd = np.sqrt(np.maximum(np.diag(robust), np.diag(covariance)))[size.size - k :]
     out = []
     names = [(h, n) for h in found.members for n in h.free]
-    for (h, name), s in zip(names, sd.tolist(), strict=True):
+    for (h, name), s, change in zip(names, sd.tolist(), found.theta.tolist(), strict=True):
         p = h.parameter(name)
-        value, half = value_in(found.model, h, name), wide * p.sigma * s
+        value, half = value_in(found.model, h, name), p.sigma * wide * math.hypot(s, DOUBT * change)
         out.append(Estimate(value, value - half, value + half, p.unit))
     return out
