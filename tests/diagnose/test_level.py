@@ -14,6 +14,7 @@ from aqualog.diagnose.campaign.expect import Driven, respond
 from aqualog.diagnose.campaign.noise import fit
 from aqualog.diagnose.campaign.observe import passes_of
 from aqualog.diagnose.campaign.passes import expected_values
+from aqualog.diagnose.search import DOUBT
 from aqualog.model.effects import EFFECTS
 from aqualog.model.log import as_signals
 from aqualog.model.programme import SEDAN
@@ -123,20 +124,23 @@ def cleared():
 
 
 def test_track_clearing_is_named(cleared):
-    found = diagnose_campaign(cleared.configured.campaign, cleared, seed=1, surrogates=120)
+    found, again = (
+        diagnose_campaign(cleared.configured.campaign, cleared, seed=1, surrogates=19) for _ in range(2)
+    )  # fmt: skip
+    assert (again.sentence, again.significance) == (found.sentence, found.significance)
     assert found.verdict == "named", found.sentence
     (cause,) = found.causes
     assert cause.key == "track_clearing"
     assert cause.probability >= 0.95
-    assert 3e-4 < cause.parameters["delta_film"].value < 9e-4
+    size = cause.parameters["delta_film"]
+    assert 3e-4 < size.value < 9e-4
+    assert size.high - size.value > 1.9 * DOUBT * size.value  # a car's response is never quite the simulator's
     assert any(c.startswith("slip_slope_r") for c in cause.explains)
     assert found.gain.low > 0.0
     assert [t.effect.name for t in found.model.terms] == ["track_clearing"]
-    one, again = (diagnose_campaign(cleared.configured.campaign, cleared, seed=1, surrogates=9) for _ in range(2))
-    assert again.sentence == one.sentence
-    assert again.significance == one.significance
 
 
+@pytest.mark.nightly
 @pytest.mark.xfail(strict=True, reason="20 % low: the contact fluctuates as fast as a wheel's slip answers")
 def test_the_interval_of_track_clearing_holds_its_size(cleared):
     found = diagnose_campaign(cleared.configured.campaign, cleared, seed=1, surrogates=19)

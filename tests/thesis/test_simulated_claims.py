@@ -20,12 +20,15 @@ ELSE = {
 # than runs scatter (C50); the interval of six seeds is wider than the 10 km/h it must lie in (C17); a few cases of
 # acceleration in 27 are mixed (C21): which side they fall on is the business of the seeds
 AT_THE_EDGE = {"C3", "C14", "C17", "C21", "C23", "C50"}
+LONG = {"C12", "C20", "C22", "C49", "C51"}  # 7 to 19 s each
 MAKERS = {
     m.claims[0]: m.checks for module in (spins, resistance, slip_slope) for m in module.CHECKS if m.seeds == PASS_SEEDS
 }
 
 
-@pytest.mark.parametrize("claim", [c for c in MAKERS if c not in AT_THE_EDGE])
+@pytest.mark.parametrize(
+    "claim", [pytest.param(c, marks=[pytest.mark.nightly] * (c in LONG)) for c in MAKERS if c not in AT_THE_EDGE]
+)
 def test_claim(claim):
     checks = MAKERS[claim](Plan(SEEDS))
     assert {c.claim for c in checks} == {claim}

@@ -156,6 +156,13 @@ def _score(mean, scatter, z, x, P, tail, A, y):  # type: ignore[no-untyped-def]
 
 
 @part
+def _copy(x, to):  # type: ignore[no-untyped-def]
+    # an assignment of arrays compiles a message about their shapes, for 4 s
+    for k in range(x.size):
+        to[k] = x[k]
+
+
+@part
 def _place(log_v, i):  # type: ignore[no-untyped-def]
     """Node below a cell of the full speed, and how far it is on the way to the next."""
     place = min(max((_LOG[i] - log_v - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
@@ -268,7 +275,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     if not math.isnan(old[_V]):
         # slower, a road counts as dry whatever lies on it
         _learn(p, m, old, dry if old[_V] > p.v_least else 1.0)
-    m.window[at] = row
+    _copy(row, m.window[at])
     _predict(p, t, m)
     traction, more = _gather(p, m)
     w = np.empty(_NV)
@@ -319,7 +326,7 @@ def _scan(p, t, m, x):  # type: ignore[no-untyped-def]
                 _step(p, t, m, row)
             else:
                 m.out[:] = math.nan
-        out[:, i] = m.out
+        _copy(m.out, out[:, i])
     return out
 
 

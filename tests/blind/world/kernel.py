@@ -283,7 +283,8 @@ def drive_car(target, ability, unrest, wander, gust, road, ds, p, w, style, refi
             keep = j == 0
             stiffest = max(stiffest, _rhs(t, y, f1, row, keep, p, w, road, ds, a, b, e, g))
             if keep:
-                rows[k] = row
+                for c in range(row.size):  # an assignment of arrays compiles a message about shapes, for 3 s
+                    rows[k, c] = row[c]
             for i in range(N):
                 z[i] = y[i] + 0.5 * h * f1[i]
             _rhs(t + 0.5 * h, z, f2, row, False, p, w, road, ds, m, q, r, g)
