@@ -46,7 +46,7 @@ Stretch = tuple[int, int]
 SPEEDS = ("v_x", "omega_fl", "omega_fr", "omega_rl", "omega_rr")
 """Signals that show whether the car stands, the best one first."""
 
-_SPEED = (3.0, 2.0, 0.03)  # least time [s]; speed below which a car counts as standing, coarsest step [m/s]
+_SPEED = (2.0, 2.0, 0.03)  # least time [s]; speed below which a car counts as standing, coarsest step [m/s]
 _TORQUE = (60.0, 0.0, np.inf)  # [s], [N*m], [N*m]
 _BODY = (10.0, -1.0, np.inf)  # accelerations and yaw rate, which may stand at zero too
 _OF_BODY = ("a_x", "a_y", "yaw_rate")

@@ -20,7 +20,8 @@ from aqualog.detect.events import AFTER
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import LEVEL, MEASURE, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
-from aqualog.detect.spin import HELD_S, MU_FULL, SLIP_FULL, SPIN_DOWN, SPIN_UP
+from aqualog.detect.spin import HELD_S, MU_FULL, SLIP_FULL, SPIN_DOWN, SPIN_UP, spins_round
+from aqualog.physics.load import G
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
@@ -121,7 +122,7 @@ class JointCriteriaWatch:
         self._other = other_surface.OtherParams.make(setup.dt)
         self._surface = other_surface.initial_state()
         self._free: dict[tuple[str, str], tuple[bool, bool]] = {}
-        self._open = self._hold = self._recent = 0
+        self._open = self._hold = self._recent = self._round = 0
         self._stopped = dict.fromkeys(WHEELS, 0)
 
     def push(self, scene: Scene) -> Output:
@@ -131,8 +132,10 @@ class JointCriteriaWatch:
         _, after, self._ages = cusum.ages(self._dt, self._ages, g, gate)
         gate, self._open = hold_on(gate, self._open, seconds=GATE_HOLD, dt=self._dt)
         slope = self._may_be_water(scene, x)
+        # on its way from one side to the other the drift is small for a moment
+        rotates, self._round = hold_on(spins_round(f, beyond=G), self._round, seconds=HOLD, dt=self._dt)
         found = criteria(
-            [(t, self._began_free(t, scene)) for t in scene.tracks],
+            [(t, self._began_free(t, scene, rotates)) for t in scene.tracks],
             {w: f[f"v_w_{w}"] for w in scene.wheels},
             {w: traction(f, w) for w in WHEELS},
             f["v_x_hat"],
@@ -184,14 +187,16 @@ class JointCriteriaWatch:
             stopped |= bits
         return stopped
 
-    def _began_free(self, track: Track, scene: Scene) -> BoolArray:
+    def _began_free(self, track: Track, scene: Scene, rotates: BoolArray) -> BoolArray:
         if track.detector not in _OF_WHEELS or track.wheel is None:
             return track.active
         key = (track.detector, track.wheel)
         bits, self._free[key] = began_free(
             track.active, scene.braking[track.wheel], self._free.get(key, (False, False))
         )
-        return bits
+        bits = bits & ~rotates
+        # a wheel may spin up on water before the car spins round, and go on where the road is dry
+        return bits & ~spins_round(scene.f) if track.detector == SPIN_UP.name else bits
 
 
 def joint_needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:

@@ -26,7 +26,8 @@ from aqualog.detect.joint_criteria import (
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import MEASURE, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
-from aqualog.detect.spin import SPIN_DOWN, SPIN_UP, has_lost_traction
+from aqualog.detect.spin import SPIN_DOWN, SPIN_UP, has_lost_traction, spins_round
+from aqualog.physics.load import G
 
 __all__ = ["JOINT_CUSUM", "TERMS", "JointCusumParams", "JointCusumWatch", "terms"]
 
@@ -125,12 +126,14 @@ def _counts(track: Track, scene: Scene) -> BoolArray:
     Of a variance 0.7 must belong to one axle. A wheel that spins up must have lost its traction, as the single detector
     asks (C27), and not in a car that spins round: on a dry road the engine spins it up with all of it.
     """
-    bits = ~scene.braking[track.wheel] if track.wheel is not None else np.ones(scene.size, dtype=bool)
+    if track.wheel is None:
+        return np.ones(scene.size, dtype=bool)
+    bits = ~scene.braking[track.wheel] & ~spins_round(scene.f, beyond=G)
     if track.detector == MINOR_SPIN_DOWN.name:
         with np.errstate(invalid="ignore"):
             bits &= track.statistic > ALONE * scene.f.get(f"variance_{track.wheel}", track.statistic)
-    if track.detector == SPIN_UP.name and track.wheel is not None:
-        bits &= track.active | has_lost_traction(scene.f, track.wheel)
+    if track.detector == SPIN_UP.name:
+        bits &= (track.active & ~spins_round(scene.f)) | has_lost_traction(scene.f, track.wheel)
     return bits
 
 

@@ -35,7 +35,7 @@ from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
     "HELD_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SPIN_UP", "SpinParams", "SpinState",
-    "SpinWatch", "has_lost_traction", "initial_state", "scan", "wheel_evidence",
+    "SpinWatch", "has_lost_traction", "initial_state", "scan", "spins_round", "wheel_evidence",
 ]  # fmt: skip
 
 THRESHOLD = 0.6  # [m/s]
@@ -187,13 +187,21 @@ class SpinWatch:
 def has_lost_traction(f: Features, wheel: str) -> BoolArray:
     """Where a spin-up of a driven wheel may be water's (n,): little traction (C27), and no spinning car.
 
-    A car that spins round drifts: a_y - v_x yaw_rate, the rate of its lateral velocity, is large. Without torque every
-    spin-up counts: cars on a dry track spin their wheels while they drift.
+    Without torque every spin-up counts: cars on a dry track spin their wheels while they drift.
     """
     mu = traction(f, wheel)
+    with np.errstate(invalid="ignore"):
+        return np.ones(f["v_x_hat"].size, dtype=bool) if mu is None else ~spins_round(f) & (mu < MU_SPIN_UP)
+
+
+def spins_round(f: Features, *, beyond: float = SIDEWAYS) -> BoolArray:
+    """Where the car drifts (n,): a_y - v_x yaw_rate, the rate of its lateral velocity, is large. [m/s²]
+
+    Beyond `G` no tyre turns the car: it rotates, and its wheels roll as they lie across the road.
+    """
     drift = f["a_y_slow"] - f["v_x_hat"] * f["yaw_rate_slow"]
     with np.errstate(invalid="ignore"):
-        return np.ones(drift.size, dtype=bool) if mu is None else ~(np.abs(drift) > SIDEWAYS) & (mu < MU_SPIN_UP)
+        return np.asarray(np.abs(drift) > beyond)
 
 
 def wheel_evidence(scene: Scene, wheel: str, mu: FloatArray | None) -> dict[str, Any]:

@@ -210,3 +210,23 @@ def test_water_stops_a_braked_wheel_and_ice_turns_it_up_again(road, limit):
         (full, _), false, _ = episode_study.stop(road, seed, episode_study.SCORING_POOL)
         assert np.isnan(full) or full <= limit
         assert not false
+
+
+@pytest.mark.parametrize("joint", [JOINT_CRITERIA, JOINT_CUSUM])
+@pytest.mark.parametrize(("detector", "yaw_rate", "counts"), [
+    ("spin_down", 0.2, True), ("spin_down", 1.0, False), ("spin_up", 0.2, False), ("spin_up", 1.0, False),
+    ("minor_spin_down", 0.2, True), ("minor_spin_down", 1.0, False),
+])  # fmt: skip
+def test_wheels_of_a_car_that_spins_round_are_no_evidence(joint, detector, yaw_rate, counts):
+    """At 27 m/s without a force to the side: beyond 3 m/s² no spin-up counts, beyond 9.8 m/s² no wheel."""
+    seen = scene([track("resistance", True, statistic=0.1), track(detector, True, statistic=5.0)])
+    seen.f.update(mu_fr=np.full(N, 0.2), a_kin_slow=np.zeros(N))  # a spin-up would need less traction to begin
+    assert watched(joint, seen)[0].active.any()
+    seen.f["yaw_rate_slow"] = np.full(N, yaw_rate)
+    assert watched(joint, seen)[0].active.any() == counts
+
+
+def test_a_car_that_swings_from_one_side_to_the_other_still_spins():
+    seen = scene([track("spin_down", True)])
+    seen.f["yaw_rate_slow"] = np.where(np.arange(N) < 20, 1.0, 0.0)
+    assert np.flatnonzero(watched(JOINT_CRITERIA, seen)[0].active)[0] == pytest.approx(20 + 0.5 / DT, abs=1)
