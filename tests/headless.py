@@ -7,12 +7,13 @@ import time
 
 import pytest
 
+# figures in space are drawn by software where there is no graphics card
 FLAGS = (
-    "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--headless=new", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
     "--host-resolver-rules=MAP * ~NOTFOUND", "--window-size=1400,2000",
 )  # fmt: skip
-PATIENCE = 60.0  # [s] a loaded machine draws slowly
+PATIENCE = 90.0  # [s] a loaded machine draws slowly
 
 
 def absent():

@@ -39,12 +39,76 @@ GRIPS = float(np.arcsinh(0.02 / FilterParams._field_defaults["scale_D"]))  # 2 %
 WET = 0.6  # [-] log ratio up to which water counts as such
 STOPS_AT = 0.93  # a free wheel stops at about this share of the speed at which its contact ends
 LAW_SD = 0.20  # [-] log of a tyre's full speed about a law
+BANDWIDTH = 0.06  # [-] of the log ratio
+KINDS = 8  # of dry road, as many of wet, and of other surfaces
+LEAST = 1e-3  # [-] of a variance
 _N, _Z = len(state.FEATURES), state.COVARIATES
+_TAIL = FilterParams._field_defaults["tail"]
 NEUTRAL = Emissions(
     np.zeros((NODES.size, _N, _Z)), np.tile(1e9 * np.eye(_N), (NODES.size, 1, 1)), np.ones(NODES.size),
     np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((2, _N, _Z)), np.tile(1e9 * np.eye(_N), (2, 1, 1)),
     np.ones(2), np.array([0.0, 1.0]),
 )  # fmt: skip
+
+
+def laws_of(x, z, where):
+    """Mean by covariates (nodes, _N, _Z) and covariance (nodes, _N, _N) at each node: local regression by Student's law.
+
+    `where` (n,): log of the speed of full aquaplaning over the car's.
+    """
+    mean, scatter = np.empty((NODES.size, _N, _Z)), np.empty((NODES.size, _N, _N))
+    for k, node in enumerate(NODES):
+        away = where - node
+        near = np.exp(-0.5 * (away / BANDWIDTH) ** 2)
+        form = np.column_stack([z, away])
+        w = near
+        for _ in range(6):
+            fit = np.linalg.solve(form.T @ (w[:, None] * form) + LEAST * np.eye(_Z + 1), form.T @ (w[:, None] * x))
+            left = x - form @ fit
+            S = left.T @ (w[:, None] * left) / near.sum() + LEAST * np.eye(_N)
+            w = near * (_TAIL + _N) / (_TAIL + np.einsum("ni,ij,nj->n", left, np.linalg.inv(S), left))
+        mean[k], scatter[k] = fit[:_Z].T, S
+    return mean, scatter
+
+
+def kinds_of(x, z, rng):
+    """Means, covariances and shares of `KINDS` kinds of windows (n, features): a mixture of Student's laws.
+
+    The means depend on covariates z (n, 1 or more), the first of which is 1.
+    """
+    mean = np.zeros((KINDS, _N, _Z))
+    mean[:, :, 0] = x[rng.choice(len(x), KINDS, replace=False)]
+    used = z.shape[1]
+    S = np.tile(np.cov(x.T), (KINDS, 1, 1))
+    share = np.full(KINDS, 1.0 / KINDS)
+    for _ in range(150):
+        left = x - z @ mean[:, :, :used].transpose(0, 2, 1)
+        square = np.einsum("kni,kij,knj->kn", left, np.linalg.inv(S), left)
+        logs = np.log(share)[:, None] - 0.5 * np.linalg.slogdet(S)[1][:, None]
+        logs = logs - 0.5 * (_TAIL + _N) * np.log1p(square / _TAIL)
+        r = np.exp(logs - logs.max(axis=0))
+        r /= r.sum(axis=0)
+        w = r * (_TAIL + _N) / (_TAIL + square)
+        share = r.mean(axis=1)
+        for k, form in enumerate(w[:, :, None] * z):
+            mean[k, :, :used] = np.linalg.solve(form.T @ z + LEAST * np.eye(used), form.T @ x).T
+        left = x - z @ mean[:, :, :used].transpose(0, 2, 1)
+        S = np.einsum("kn,kni,knj->kij", w, left, left) / r.sum(axis=1)[:, None, None] + LEAST * np.eye(_N)
+    return mean, S, share
+
+
+def _text(x):
+    return f"{float(x):.4g}" if np.ndim(x) == 0 else "[" + ", ".join(_text(y) for y in x) + "]"
+
+
+def text_of(found, note):
+    """Lines of the file of emissions, by drivetrain."""
+    yield f"# {note}"
+    yield f"version = {emissions.VERSION}"
+    for drivetrain, tables in found.items():
+        yield f"\n[{drivetrain}]"
+        for name, x in tables._asdict().items():
+            yield f"{name} = {_text(x)}"
 
 
 def windows(columns, vehicle, dt, *wet):
@@ -140,15 +204,15 @@ def learn(found):
         own = found[found[:, 0] == d]
         road, ratio, x = own[:, 1], own[:, 2], own[:, 4:]
         at, rng = road == 1, np.random.default_rng(1)
-        near = np.exp(-0.5 * ((ratio[at] - NODES[:, None]) / emissions.BANDWIDTH) ** 2)
+        near = np.exp(-0.5 * ((ratio[at] - NODES[:, None]) / BANDWIDTH) ** 2)
         wet = (road > 0) & (road < OTHER) & (ratio < WET)
         # what slips on snow slips in proportion to the traction; means of water that did so warned on a measured road
         roads = ((road == 0, 1), (wet, 1), (road == OTHER, _Z))
-        kinds = [emissions.kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]
+        kinds = [kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]
         m, S, share = (np.concatenate(k) for k in zip(*kinds, strict=True))
         tables[drivetrain] = Emissions(
-            *emissions.laws_of(x[at, :_N], x[at, _N:], ratio[at]), near @ own[at, 3] / near.sum(axis=1), before, m, S,
-            share, np.repeat([0.0, 1.0, 2.0], emissions.KINDS),
+            *laws_of(x[at, :_N], x[at, _N:], ratio[at]), near @ own[at, 3] / near.sum(axis=1), before, m, S,
+            share, np.repeat([0.0, 1.0, 2.0], KINDS),
         )  # fmt: skip
     return tables, len(found)
 
@@ -165,7 +229,7 @@ def main():
     tables, n = learn(np.load(a.keep)["x"])
     note = f"Made by `python -m tests.margin.learn` from {n} windows."
     target = Path(emissions.__file__).with_name("emissions.toml")
-    target.write_text("\n".join(emissions.text_of(tables, note)) + "\n", encoding="utf-8")
+    target.write_text("\n".join(text_of(tables, note)) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

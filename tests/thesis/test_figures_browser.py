@@ -1,62 +1,23 @@
 """The page of all figures in headless Chromium without a network: each plot is drawn, nothing is asked for."""
 
-import json
-import os
-import shutil
-import time
-
 import pytest
 
 from aqualog.thesis.page import panel_ids, render_figures
+from tests.headless import requests, severe, wait_for
 from tests.thesis.made import all_made
 
 pytestmark = pytest.mark.browser
-
-# figures in space are drawn by software where there is no graphics card
-FLAGS = (
-    "--headless=new", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
-    "--host-resolver-rules=MAP * ~NOTFOUND", "--window-size=1400,1200",
-)  # fmt: skip
-PATIENCE = 90.0  # [s] a loaded machine draws slowly
-BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    binary = next((p for n in BROWSERS if (p := shutil.which(n))), None)
-    if not (binary and shutil.which("chromedriver")):
-        if os.environ.get("CI"):
-            pytest.fail("chromium or chromedriver not found, and the browser tests must run in CI")
-        pytest.skip("chromium or chromedriver not found")
-    from selenium import webdriver
-    from selenium.webdriver.chrome.service import Service
-
-    options = webdriver.ChromeOptions()
-    options.binary_location = binary
-    for flag in (*FLAGS, f"--user-data-dir={tmp_path_factory.mktemp('profile')}"):
-        options.add_argument(flag)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
-    driver.execute_cdp_cmd("Network.enable", {})
-    offline = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
-    driver.execute_cdp_cmd("Network.emulateNetworkConditions", offline)
-    yield driver
-    driver.quit()
 
 
 @pytest.fixture(scope="module")
 def opened(browser, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "figures.html"
     path.write_text(render_figures(all_made(), title="all figures"), encoding="utf-8")
-    for kind in ("browser", "performance"):
-        browser.get_log(kind)
+    severe(browser), requests(browser)  # what pages before it have left
     browser.get(path.as_uri())
-    end = time.monotonic() + PATIENCE
-    while not browser.execute_script("return document.body.dataset.ready === 'true'"):
-        assert time.monotonic() < end, "the page did not get there in time"
-        time.sleep(0.1)
-    return browser
+    wait_for(lambda: browser.execute_script("return document.body.dataset.ready === 'true'"))
+    yield browser
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": []})
 
 
 def test_every_plot_is_drawn(opened):
@@ -84,15 +45,9 @@ def test_colours_follow_the_scheme(opened):
     opened.execute_cdp_cmd(
         "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "dark"}]}
     )
-    end = time.monotonic() + PATIENCE
-    while opened.execute_script(colour) == light:
-        assert time.monotonic() < end, "the plots stay light"
-        time.sleep(0.1)
+    wait_for(lambda: opened.execute_script(colour) != light)
 
 
 def test_no_error_and_no_request(opened):
-    log = [e for e in opened.get_log("browser") if e["level"] == "SEVERE" or "Content Security" in e["message"]]
-    assert log == []
-    messages = [json.loads(entry["message"])["message"] for entry in opened.get_log("performance")]
-    urls = [m["params"]["request"]["url"] for m in messages if m["method"] == "Network.requestWillBeSent"]
-    assert [u for u in urls if not u.startswith(("file:", "data:", "blob:"))] == []
+    assert severe(opened) == []
+    assert requests(opened) == []

@@ -63,6 +63,12 @@ class Track:
         self.measured.append(run.logs[0].name)
         return work(run, *task)
 
+    def settle(self, name, data):
+        """What is said of a log once it has not changed for a while."""
+        self.put(name, data)
+        self.look()
+        return self.look(SETTLE_S)
+
     def look(self, seconds=0.0):
         """All lines of a look, and what is known then."""
         self.now += seconds
@@ -113,9 +119,7 @@ def test_a_copy_that_paused_is_damaged_first_and_measured_when_it_is_whole(track
     assert list(found.failed) == ["a.parquet"]
     assert problems(found)[0].startswith("a.parquet: ")
     assert len(found.missing) == 3  # its run is still to be driven, or copied
-    track.put("a.parquet", stock[0])
-    track.look()
-    lines, found = track.look(SETTLE_S)
+    lines, found = track.settle("a.parquet", stock[0])
     assert "74.0 km/h, valid" in lines[0]
     assert found.failed == {}
 
@@ -136,9 +140,7 @@ def test_a_copy_that_changed_behind_its_size_and_time(track, stock):
 def test_damaged_logs_are_named_and_others_go_on(track, stock):
     track.put("a.parquet", b"PAR1 nothing")
     track.put("b.parquet", stock[1])
-    track.put("c.parquet", stock[2])
-    track.look()
-    lines, found = track.look(SETTLE_S)
+    lines, found = track.settle("c.parquet", stock[2])
     assert len(lines) == 2
     assert [e.log for e in found.test.entries] == ["b.parquet", "c.parquet"]
     assert len(track.measured) == 3
@@ -148,31 +150,21 @@ def test_damaged_logs_are_named_and_others_go_on(track, stock):
 
 
 def test_the_same_log_twice_counts_once(track, stock):
-    track.put("copy of it.parquet", stock[0])
-    track.look()
-    track.look(SETTLE_S)
-    track.put("a.parquet", stock[0])
-    track.look()
-    _, found = track.look(SETTLE_S)
+    track.settle("copy of it.parquet", stock[0])
+    _, found = track.settle("a.parquet", stock[0])
     # the copy that the campaign names has the row
     assert [e.log for e in found.test.entries] == ["a.parquet"]
     assert found.same == {"copy of it.parquet": "a.parquet"}
     assert found.unplanned == ()
     assert "copy of it.parquet: the same log as a.parquet, counts once" in problems(found)
-    track.put("a.parquet", stock[3])
-    track.look()
-    _, found = track.look(SETTLE_S)
+    _, found = track.settle("a.parquet", stock[3])
     assert sorted(e.log for e in found.test.entries) == ["a.parquet", "copy of it.parquet"]
     assert found.same == {}
 
 
 def test_a_copy_that_comes_later_does_not_take_the_row(track, stock):
-    track.put("a.parquet", stock[0])
-    track.look()
-    track.look(SETTLE_S)
-    track.put("x again.parquet", stock[0])
-    track.look()
-    lines, found = track.look(SETTLE_S)
+    track.settle("a.parquet", stock[0])
+    lines, found = track.settle("x again.parquet", stock[0])
     assert lines == []
     assert [e.log for e in found.test.entries] == ["a.parquet"]
     assert found.same == {"x again.parquet": "a.parquet"}
@@ -195,9 +187,7 @@ def test_a_log_that_can_be_read_in_part_is_no_run(track, tmp_path):
 
 
 def test_a_folder_that_is_away_and_comes_back(track, stock):
-    track.put("a.parquet", stock[0])
-    track.look()
-    track.look(SETTLE_S)
+    track.settle("a.parquet", stock[0])
     track.logs.rename(track.base / "elsewhere")
     _, found = track.look(1.0)
     assert found.look.away
@@ -241,9 +231,7 @@ def test_a_process_that_ends_is_one_log(track, stock):
 
 
 def test_logs_that_no_run_names_and_runs_to_come(track, stock):
-    track.put("x17.parquet", stock[0])
-    track.look()
-    lines, found = track.look(SETTLE_S)
+    lines, found = track.settle("x17.parquet", stock[0])
     assert "74.0 km/h, valid" in lines[0]
     assert found.unplanned == ("x17.parquet",)
     assert "in no run of the campaign: x17.parquet" in problems(found)
@@ -263,9 +251,7 @@ def test_a_run_of_two_files_waits_for_both(tmp_path, stock):
     track.put("a.parquet", stock[0])
     track.look()
     assert track.look(SETTLE_S)[0] == []
-    track.put("gps.csv", b"t [s],latitude [deg]\n0,48\n1,48\n2,48\n")
-    track.look()
-    lines, found = track.look(SETTLE_S)
+    lines, found = track.settle("gps.csv", b"t [s],latitude [deg]\n0,48\n1,48\n2,48\n")
     assert "74.0 km/h, valid" in lines[0]
     assert found.missing == ()
 
@@ -282,9 +268,7 @@ def test_hidden_and_half_named_files_are_no_logs(track, stock):
 
 def test_the_page_renews_itself_and_holds_what_counts(track, stock):
     track.put("a.parquet", stock[0])
-    track.put("c.parquet", b"PAR1 nothing")
-    track.look()
-    _, found = track.look(SETTLE_S)
+    _, found = track.settle("c.parquet", b"PAR1 nothing")
     page = watch_page(found, title="monday", clock="14:03:21", refresh_s=3)
     assert '<meta http-equiv="refresh" content="3">' in page
     assert "at 14:03:21" in page
