@@ -56,7 +56,8 @@ def conclude(found: Found, model: Model) -> Outcome:
 
     An unknown form comes before any name; beside it stand the effects of the same set whose probability is 0.95 or
     more. A name needs that probability too, and must pass the checks of `judge.repeats`. Else the answer is what the
-    posterior consists of, up to 0.95. Sets whose causes worth naming are the same count together.
+    posterior consists of, up to 0.95. Sets whose causes worth naming are the same count together. An only answer
+    that fails a check and leaves the channels larger than it finds them is noise.
     """
     if found.forms:
         linear = _linear(found.arena, found.posterior, found.posterior.best, model)
@@ -79,6 +80,8 @@ def conclude(found: Found, model: Model) -> Outcome:
 
     sets = candidates([(o, o.evidence) for o in found.options], causes_of)
     d = decided(sets, lambda group: _at_place(found, group, model), failing)
+    if d.verdict == "cannot_tell" and not d.alternatives and d.best and not _is_gain(found, d.best.option.refit, model):
+        return Outcome("no_effect", (), small=d.notes)
     return Outcome(
         d.verdict, d.causes, d.alternatives, d.best.option.refit if d.best else None, d.notes, d.certain,
         tuple(Rival(s.option.refit, q) for s, q in d.rivals if s.option.refit is not None),
@@ -143,7 +146,7 @@ def _cause(
 ) -> tuple[Cause, bool]:
     """A cause, and whether a value reaches its smallest size and its interval excludes zero effect.
 
-    An interval also covers that the car's response to the effect is a few per cent off the simulator's, or its tyre's law.
+    An interval also covers that the car's response to the effect is a few per cent off the simulator's, or a tyre's.
     """
     sd = np.hypot(sd, math.hypot(DOUBT, h.effect.drive.doubt) * off)
     parameters, large = {}, False
@@ -158,15 +161,28 @@ def _cause(
     return Cause(h.effect.name, h.where, parameters, explains, cause_sentence(h.effect, h.where, parameters)), large
 
 
-def _explains(arena: Arena, before: Sequence[FloatArray], after: Sequence[FloatArray]) -> tuple[str, ...]:
-    """Channels whose rms falls, from residuals without and with an effect."""
+def _is_gain(found: Found, r: Refit | None, model: Model) -> bool:
+    """Whether a refitted set makes the channels' rms smaller on the whole; one that is not refitted may."""
+    if r is None:
+        return True
+    off = r.values - np.array([value_in(model, r.members[i], n) for i, n in r.names])
+    before = [x + np.tensordot(off, s, axes=1) for x, s in zip(r.residuals, r.signatures, strict=True)]
+    return bool(_falls(found.arena, before, r.residuals).sum() > 0.0)
+
+
+def _falls(arena: Arena, before: Sequence[FloatArray], after: Sequence[FloatArray]) -> FloatArray:
+    """Share by which each channel's rms falls, from residuals without and with an effect."""
     drives = arena.evidence.drives
     fall = np.zeros(len(drives[0].channels))
     for d, x, y in zip(drives, before, after, strict=True):
         then, now = (np.sqrt((z[:, d.mask] ** 2).mean(axis=1)) for z in (x, y))
         fall += then / np.maximum(now, 1e-15) - 1.0
-    fall /= len(drives)
-    channels = drives[0].channels
+    return np.asarray(fall / len(drives))
+
+
+def _explains(arena: Arena, before: Sequence[FloatArray], after: Sequence[FloatArray]) -> tuple[str, ...]:
+    """Channels whose rms falls, from residuals without and with an effect."""
+    fall, channels = _falls(arena, before, after), arena.evidence.drives[0].channels
     return tuple(c for c, x in zip(channels, fall.tolist(), strict=True) if x > EXPLAINS) or (
         channels[int(np.argmax(fall))],
     )

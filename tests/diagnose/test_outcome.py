@@ -167,6 +167,17 @@ def test_a_failed_check_forbids_a_name(monkeypatch):
     assert o.certain == frozenset()
 
 
+def test_what_fails_a_check_and_makes_the_channels_larger_is_noise(monkeypatch):
+    against = S.copy()
+    against[AT["payload_mass"]] = -LEFT / 300.0
+    assert told(option(signatures=against, payload_mass=200.0)).verdict == "named"
+    monkeypatch.setattr(outcome, "repeats", lambda *_: ("a value stands at its physical bound.",))
+    o = told(option(signatures=against, payload_mass=200.0))
+    assert (o.verdict, o.causes, o.small[-1]) == ("no_effect", (), "Not named: a value stands at its physical bound.")
+    rivals = option(signatures=against, payload_mass=200.0), option(SURE - 0.7, torque_gain=0.9)
+    assert told(*rivals).verdict == "cannot_tell"
+
+
 def test_only_what_is_worth_naming_is_asked_whether_it_repeats(monkeypatch):
     asked = []
     monkeypatch.setattr(outcome, "repeats", lambda *given: asked.append(set(given[-1])) or ())
