@@ -1,6 +1,7 @@
 """The grammar of verdicts, on sets that are made up."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -197,6 +198,8 @@ def test_what_is_certain_is_not_called_open():
     assert said == "Certain: road grade. This log cannot distinguish the other causes: road grade (mean) or aero drag."
     both = verdict_sentence("cannot_tell", causes[1:], level=0.01)
     assert both == "The car differs from the model, but this log cannot distinguish aero drag and head wind."
+    one = verdict_sentence("cannot_tell", [replace(causes[0], probability=0.998)], level=0.01)
+    assert one == "The car may differ from the model: payload mass explains this log best, but fails a check."
 
 
 def test_a_slope_of_the_tyre_is_known_as_well_as_the_form_of_its_curve():
