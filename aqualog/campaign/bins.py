@@ -49,7 +49,7 @@ class Pool(NamedTuple):
     step: NDArray[np.int64]
     columns: dict[str, FloatArray]
 
-    def part(self, which: BoolArray) -> Pool:
+    def part(self, which: NDArray[np.int64] | slice) -> Pool:
         """Some of the samples."""
         return Pool(self.run[which], self.step[which], {k: x[which] for k, x in self.columns.items()})
 
@@ -208,8 +208,12 @@ def cells(
         pool = pooled([(i, step, c) for _, i, step, c in pieces])
         infos = {info.index: info for info, *_ in pieces}
         bin_of = np.floor(pool.columns["v_x"] / KMH / plan.width_kmh) if by_speed else np.full(pool.run.size, math.nan)
-        for k in np.unique(bin_of).tolist():
-            here = pool.part(bin_of == k) if by_speed else pool
+        if by_speed:  # the samples of a bin side by side, in their order
+            order = np.argsort(bin_of, kind="stable")
+            pool, bin_of = pool.part(order), bin_of[order]
+        bins, starts = np.unique(bin_of, return_index=True)
+        for k, start, end in zip(bins.tolist(), starts, [*starts[1:], bin_of.size], strict=True):
+            here = pool.part(slice(start, end))
             low, high = k * plan.width_kmh, (k + 1.0) * plan.width_kmh
             out.append(Cell(group, place, road, low, high, here, tuple(infos[i] for i in np.unique(here.run))))
     return out, Counter({k: n for k, n in left_out.items() if n})

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.core.compiled import compiled
 from aqualog.core.records import FloatArray
 
 __all__ = [
@@ -123,12 +124,20 @@ def run_numbers(d: Design, first: Index) -> Index:
 
 def _second_differences(d: Design, i: int, first: Index) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Per run: sum of D x D y and of (D x)^2 over triples of samples, and their number."""
-    a = 2 * APART
-    if d.y.size <= a:
-        return np.zeros(first.size), np.zeros(first.size), np.zeros(first.size)
-    run = run_numbers(d, first)
-    whole = (run[a:] == run[:-a]) & (d.step[a:] - d.step[:-a] == a) & (d.step[APART:-APART] - d.step[:-a] == APART)
-    d_x, d_y = (second_difference(v, APART) for v in (d.columns[i], d.y))
-    r = run[a:][whole]
-    both, same = (np.bincount(r, product[whole], first.size).astype(np.float64) for product in (d_x * d_y, d_x * d_x))
-    return both, same, np.bincount(r, minlength=first.size).astype(np.float64)
+    both, same, triples = _differences(d.columns[i], d.y, d.step, np.append(first, d.y.size))
+    return both, same, triples
+
+
+@compiled
+def _differences(x, y, step, ends):  # type: ignore[no-untyped-def]
+    g = ends.size - 1
+    both, same, triples = np.zeros(g), np.zeros(g), np.zeros(g)
+    for r in range(g):
+        for k in range(ends[r], ends[r + 1] - 2 * APART):
+            if step[k + 2 * APART] - step[k] == 2 * APART and step[k + APART] - step[k] == APART:
+                d_x = x[k + 2 * APART] - 2.0 * x[k + APART] + x[k]
+                d_y = y[k + 2 * APART] - 2.0 * y[k + APART] + y[k]
+                both[r] += d_x * d_y
+                same[r] += d_x * d_x
+                triples[r] += 1.0
+    return both, same, triples

@@ -100,16 +100,22 @@ def _working_model(d: Design, first: Index, m: Moments, weight: FloatArray) -> _
     return _Working(variance, between)
 
 
-def _memory(e: FloatArray, run: Index, step: Index) -> float:
+@compiled
+def _memory(e, run, step):  # type: ignore[no-untyped-def]
     """Number of neighbouring samples that count as one: 1 + 2 (sum of the autocorrelation up to its first zero)."""
-    power = float(e @ e)
+    power = 0.0
+    for x in e:
+        power += x * x
     if not power > 0.0:
         return 1.0
     total = 1.0
     for lag in range(1, min(LAGS, e.size - 1) + 1):
-        pair = (run[lag:] == run[:-lag]) & (step[lag:] - step[:-lag] == lag)
-        count = int(np.count_nonzero(pair))
-        r = float((e[lag:] * e[:-lag])[pair].sum()) / power * e.size / count if count else 0.0
+        count, product = 0, 0.0
+        for k in range(lag, e.size):
+            if run[k] == run[k - lag] and step[k] - step[k - lag] == lag:
+                count += 1
+                product += e[k] * e[k - lag]
+        r = product / power * e.size / count if count else 0.0
         if r <= 0.0:
             break
         total += 2.0 * min(r, 1.0)
@@ -148,6 +154,11 @@ def _unlikelihood(m: Moments, variance: float, grid: FloatArray) -> FloatArray:
 def _inverse(x, out):  # type: ignore[no-untyped-def]
     """|det x| of a small matrix (p, p), which is used up; its inverse into `out`. Gauss and Jordan with pivots."""
     p = x.shape[0]
+    if p == 2:  # nearly always: a slope and an offset
+        determinant = x[0, 0] * x[1, 1] - x[0, 1] * x[1, 0]
+        out[0, 0], out[0, 1] = x[1, 1] / determinant, -x[0, 1] / determinant
+        out[1, 0], out[1, 1] = -x[1, 0] / determinant, x[0, 0] / determinant
+        return abs(determinant)
     for i in range(p):
         for j in range(p):
             out[i, j] = 1.0 if i == j else 0.0
@@ -273,15 +284,15 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
     d = design._replace(columns=design.columns / unit[:, None])
     first = block_starts(d.run)
     weight = np.ones_like(d.y)
-    moments = moments_of(d, first, weight)
-    working = _working_model(d, first, moments, weight)
-    moments = _about_own_mean(d, moments, working)
+    plain = moments_of(d, first, weight)
+    working = _working_model(d, first, plain, weight)
+    moments = _about_own_mean(d, plain, working)
     value, k = _solve(moments, working)
     for _ in range(ROUNDS if robust else 0):
         weight = _huber_weights(d, first, moments, working, value)
-        moments = moments_of(d, first, weight)
-        working = _working_model(d, first, moments, weight)
-        moments = _about_own_mean(d, moments, working)
+        plain = moments_of(d, first, weight)
+        working = _working_model(d, first, plain, weight)
+        moments = _about_own_mean(d, plain, working)
         old, (value, k) = value, _solve(moments, working)
         if np.all(np.abs(value - old) <= 1e-4 * np.abs(value)):
             break
@@ -291,9 +302,8 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
     i = d.noisy.index(True) if any(d.noisy) else -1
     noise = 0.0
     if i >= 0:  # fast changes that y does not follow
-        m = moments_of(d, first, weight)
-        real = float(m.c_noise[:, i].sum()) / float(value[i]) if value[i] != 0.0 else 0.0
-        noise = max(float(m.h_noise[:, i, i].sum()) - max(real, 0.0), 0.0) / float(m.weight.sum())
+        real = float(plain.c_noise[:, i].sum()) / float(value[i]) if value[i] != 0.0 else 0.0
+        noise = max(float(plain.h_noise[:, i, i].sum()) - max(real, 0.0), 0.0) / float(plain.weight.sum())
     return Estimate(
         value / unit, half / unit, dof, np.sqrt(working.between) / unit, _attenuation(moments, k, noise, i),
         noise * (float(unit[i]) ** 2 if i >= 0 else 0.0), first.size, d.y.size,

@@ -63,11 +63,13 @@ def slopes_with_aqualog(s: Samples) -> np.ndarray:
     from aqualog.core.regression import estimate
 
     found = []
-    for b in range(BINS):
-        here = s.bin == b
-        mu = s.mu[here]
+    order = np.argsort(s.bin, kind="stable")
+    run, bins, step, mu_all, slip = (x[order] for x in s)
+    edges = np.searchsorted(bins, np.arange(BINS + 1))
+    for here in (slice(a, b) for a, b in itertools.pairwise(edges.tolist())):
+        mu = mu_all[here]
         columns = np.stack([mu, np.ones_like(mu)])
-        e = estimate(Design(columns, s.slip[here], s.run[here], s.step[here], (True, True), (True, False)))
+        e = estimate(Design(columns, slip[here], run[here], step[here], (True, True), (True, False)))
         found.append((e.value[0], e.half[0]))
     return np.array(found)
 
