@@ -108,7 +108,7 @@ def moments_of(d: Design, first: Index, weight: FloatArray) -> Moments:
     total = np.add.reduceat(weight, first)
     h_noise, c_noise = np.zeros_like(h), np.zeros_like(c)
     for i in (i for i in range(p) if d.noisy[i]):
-        both, same, triples = _second_differences(d, i, first)
+        both, same, triples = _second_differences(d.columns[i], d.y, d.step, np.append(first, d.y.size))
         enough = triples >= LEAST_TRIPLES
         if triples.sum() >= LEAST_TRIPLES:
             count = np.where(enough, triples, 1)
@@ -122,14 +122,9 @@ def run_numbers(d: Design, first: Index) -> Index:
     return np.repeat(np.arange(first.size), np.diff(np.append(first, d.y.size)))
 
 
-def _second_differences(d: Design, i: int, first: Index) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Per run: sum of D x D y and of (D x)^2 over triples of samples, and their number."""
-    both, same, triples = _differences(d.columns[i], d.y, d.step, np.append(first, d.y.size))
-    return both, same, triples
-
-
 @compiled
-def _differences(x, y, step, ends):  # type: ignore[no-untyped-def]
+def _second_differences(x, y, step, ends):  # type: ignore[no-untyped-def]
+    """Per run: sum of D x D y and of (D x)^2 over triples of samples, and their number."""
     g = ends.size - 1
     both, same, triples = np.zeros(g), np.zeros(g), np.zeros(g)
     for r in range(g):
