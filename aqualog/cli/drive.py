@@ -46,18 +46,19 @@ def detect(
     from aqualog.face.arguments import refuse_existing
     from aqualog.face.detect import DETECT_FILES, detect
 
-    targets = [out / name for name in DETECT_FILES] if out else []
+    targets, written = [out / name for name in DETECT_FILES] if out else [], []
     if write is not None:
         from aqualog.io.write_log import check_suffix
         from aqualog.report.layouts import layout_texts
 
         check_suffix(write)
-        targets += [write, *(layout_texts(write, ()) if layouts else ())]
+        written = [write, *(layout_texts(write, ()) if layouts else ())]
     elif layouts:
         raise ConfigError("--layouts without --write", expected="--write FILE.mcap, the log that they show")
     if out is not None and history is not None and out.absolute() == history.absolute():
         raise ConfigError("is the folder of the results", where=str(history), expected="a file of its own")
     given = [p for p in (run.thresholds, run.model) if p is not None]
+    targets += written
     drive = run.drive(targets, others=given)
     if history is not None:
         refuse_existing([history], force=True, sources=[*drive.sources, *targets, *given])
@@ -86,6 +87,7 @@ def detect(
         *_history_notes(result, history, configuration),
         *result.notes,
         *([f"results are in {out}: {', '.join(DETECT_FILES)}"] if out is not None else []),
+        *([f"written: {', '.join(str(p) for p in written)}"] if written else []),
     ]
     return Output(result, notes, code=_gate(run, result) if fail_on_event else None)
 

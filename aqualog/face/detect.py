@@ -299,9 +299,12 @@ def detect(
     needs = ", ".join(n for n, is_asked in asked if is_asked)
     key = ""
     with one.reading():
+        is_mapped = bool(one.signal_map.entries)
         one, loaded, guessed = load_or_guess(one, car, hear, whole_for=needs)
         if isinstance(loaded, Signals):
-            check_something_to_do(loaded.symbols, 1e9 / loaded.dt_ns, loaded.quality.notes, car, one.name)
+            check_something_to_do(
+                loaded.symbols, 1e9 / loaded.dt_ns, loaded.quality.notes, car, one.name, is_mapped=is_mapped
+            )
             hear("detecting")
             past = memory
             if history is not None:
@@ -313,7 +316,7 @@ def detect(
             result = _whole(loaded, car, known, settings, past, hear, samples=samples)
         else:
             plan = loaded.drive.plan
-            check_something_to_do(plan.symbols, 1e9 / plan.grid.dt_ns, plan.notes, car, one.name)
+            check_something_to_do(plan.symbols, 1e9 / plan.grid.dt_ns, plan.notes, car, one.name, is_mapped=is_mapped)
             hear.detail(f"{plan.grid.rows} samples at {1e9 / plan.grid.dt_ns:g} Hz, gone through in windows")
             out = None if windows is None else file_of(windows, "windows")
             result = _in_windows(loaded, car, settings, memory, out, hear)
@@ -432,19 +435,21 @@ def _memory(history: PathLike | None, configuration: str, reference: str) -> Mem
 
 
 def check_something_to_do(
-    symbols: Sequence[str], rate_hz: float, notes: Sequence[str], vehicle: Vehicle, name: str
+    symbols: Sequence[str], rate_hz: float, notes: Sequence[str], vehicle: Vehicle, name: str, *, is_mapped: bool
 ) -> None:
-    """Stop with one line, a SignalError, if no detector can run."""
+    """Stop with one line, a SignalError, if no detector can run: what is missing, and rates of what is there."""
     from aqualog.detect.registry import DETECTORS, check_needs
 
     unavailable, _ = check_needs(vehicle, symbols, rate_hz=rate_hz)
     if len(unavailable) < len(DETECTORS):
         return
-    asked = ("omega_", "torque", "a_x", "wheel speeds", "signals at")
-    missing = dict.fromkeys(s for u in unavailable for s in u.missing if s.startswith(asked))
+    lacks = dict.fromkeys(s for u in unavailable for s in u.missing)
+    rates = {"wheel speeds": "omega_fl", "signals at": "a_x"}
+    asked = ("omega_", "torque", "a_x", *(rate for rate, signal in rates.items() if signal not in lacks))
+    missing = [s for s in lacks if s.startswith(asked)]
     raise SignalError(
         f"no detector can run: missing {', '.join(missing)}" + (f" ({notes[0]})" if notes else ""),
         where=name,
         expected="wheel speeds omega_fl ... omega_rr, or a_x with wheel torques",
-        hint=MAP_HINT,
+        hint="`aqualog inspect LOG` lists what the log has; the signal map must name these" if is_mapped else MAP_HINT,
     )

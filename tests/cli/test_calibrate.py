@@ -15,15 +15,9 @@ def run(*args):
 def test_table_file_and_page(dry_folder, tmp_path):
     out, page = tmp_path / "calibrated.toml", tmp_path / "page.html"
     code, text, err = run(
-        dry_folder / "a.parquet",
-        dry_folder / "b.parquet",
-        "--vehicle",
-        dry_folder / "car.toml",
-        "-o",
-        out,
-        "--page",
+        dry_folder / "a.parquet", dry_folder / "b.parquet", "--vehicle", dry_folder / "car.toml", "-o", out, "--page",
         page,
-    )
+    )  # fmt: skip
     assert code == 0, err
     assert "2 drives" in text
     assert "not determined by these drives" in text
@@ -41,14 +35,9 @@ def test_table_file_and_page(dry_folder, tmp_path):
 
 def test_json_with_what_is_given(dry_folder):
     code, text, _ = run(
-        dry_folder / "a.parquet",
-        dry_folder / "b.parquet",
-        "--vehicle",
-        dry_folder / "car.toml",
-        "--fix",
-        "mass=1500",
-        "--json",
-    )
+        dry_folder / "a.parquet", dry_folder / "b.parquet", "--vehicle", dry_folder / "car.toml", "--fix",
+        "mass=1500", "--json",
+    )  # fmt: skip
     assert code == 0
     document = json.loads(text)
     found = {p["name"]: p for p in document["parameters"]}
@@ -63,13 +52,9 @@ def test_a_folder_is_one_drive_and_a_file_counts_once(dry_folder, tmp_path):
     (tmp_path / "one").mkdir()
     (tmp_path / "one" / "x.parquet").write_bytes((dry_folder / "a.parquet").read_bytes())
     code, text, err = run(
-        tmp_path / "one",
-        dry_folder / "b.parquet",
-        dry_folder / "b.parquet",
-        "--vehicle",
-        dry_folder / "car.toml",
+        tmp_path / "one", dry_folder / "b.parquet", dry_folder / "b.parquet", "--vehicle", dry_folder / "car.toml",
         "--json",
-    )
+    )  # fmt: skip
     assert code == 0, err
     assert [d["name"] for d in json.loads(text)["drives"]] == ["one", "b.parquet"]
 

@@ -58,6 +58,7 @@ def test_written_log_gives_the_same_events_again(tmp_path, suffix):
     path = tmp_path / f"again{suffix}"
     first = run("detect", MF4, "--vehicle", CAR, "--write", path, "--json")
     assert first.exit_code == 0, first.stderr
+    assert f"note: written: {path}\n" in first.stderr
     second = run("detect", path, "--vehicle", CAR, "--json")
     assert second.exit_code == 0, second.stderr
     a, b = (json.loads(r.stdout)["events"] for r in (first, second))
@@ -161,6 +162,10 @@ def test_missing_signals_end_with_4_and_one_line(tmp_path):
     result = run("detect", path)
     assert result.exit_code == 4
     assert "omega_fl" in one_error_line(result)
+    (tmp_path / "map.toml").write_text('[signals]\nlatitude = "latitude"\n')
+    told = one_error_line(run("detect", path, "--signals", tmp_path / "map.toml"))
+    assert "Hz" not in told  # a rate of what is not there is no news
+    assert told.endswith("`aqualog inspect LOG` lists what the log has; the signal map must name these")
 
 
 def test_usage_and_configuration_errors(tmp_path):
