@@ -36,6 +36,7 @@ _HEADER = re.compile(r"""^\s*\[\[?\s*([A-Za-z_"'][^\[\],=]*?)\s*\]\]?\s*(#.*)?$"
 _MARKS = {
     "campaign file": ("run", "runs"), "signal map": ("signals", "sources"), "model file": ("term",),
     "vehicle file": ("drivetrain", "mass", "l_f", "l_r", "wheels"),
+    "scenario file": ("speed_kmh", "profile", "lane"), "thresholds file": ("thresholds", "joint_cusum"),
 }  # fmt: skip
 """Keys that show which file this is."""
 

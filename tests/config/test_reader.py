@@ -10,6 +10,7 @@ from aqualog.config.model import load_model
 from aqualog.config.reader import Faults, Key, Row
 from aqualog.config.scenario import load_scenario
 from aqualog.config.signal_map import load_signal_map
+from aqualog.config.thresholds import load_thresholds
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
 
@@ -90,6 +91,8 @@ _FILES = {
     "vehicle file": (load_vehicle, 'name = "car"\nmass = 1650.0\n[wheels]\nr_e_f = 0.31\n'),
     "signal map": (load_signal_map, '[signals]\nv_x = "Speed"\n'),
     "model file": (load_model, '[[term]]\neffect = "head_wind"\n'),
+    "scenario file": (load_scenario, 'vehicle = "car.toml"\nspeed_kmh = 98.0\n'),
+    "thresholds file": (load_thresholds, "[thresholds]\nspin_down = 0.5\n"),
 }  # fmt: skip
 
 
