@@ -127,8 +127,9 @@ class _Session:
         self._kind, self._by, self._limits = kind, by, limits
         self._files: Seen = state_of(self._campaign_files())
         self.watching: Watching = Watching(
-            Arrivals(folder, SETTLE_S), own.configured, self._options(), Request(kind, limits, whole_only=True)
-        )
+            Arrivals(folder, SETTLE_S, self._campaign_files()), own.configured, self._options(),
+            Request(kind, limits, whole_only=True),
+        )  # fmt: skip
         self.last: Watched | None = None
         self.is_changed = True
         self._written_at = -_HEARTBEAT_S

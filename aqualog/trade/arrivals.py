@@ -7,7 +7,7 @@ was seen once is not forgotten.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -44,10 +44,14 @@ class Arrivals:
     folder : Path
     settle_s : float
         A file is complete when it has not changed for so long. [s]
+    apart : iterable of Path
+        Files that are no logs: the runs of the campaign.
     """
 
-    def __init__(self, folder: Path, settle_s: float) -> None:
+    def __init__(self, folder: Path, settle_s: float, apart: Iterable[Path] = ()) -> None:
         self.folder, self.settle_s = folder, settle_s
+        root = folder.resolve()
+        self._apart = {folder / q.relative_to(root) for q in (p.resolve() for p in apart) if q.is_relative_to(root)}
         self._seen: dict[Path, tuple[State, float]] = {}
 
     def look(self, now: float) -> Look:
@@ -57,7 +61,7 @@ class Arrivals:
         except OSError as error:
             return Look(away=error.strerror or str(error))
         complete, growing = [], []
-        for path in sorted(found):
+        for path in sorted(found.keys() - self._apart):
             state = found[path]
             before = self._seen.get(path)
             if before is None or before[0] != state:

@@ -293,6 +293,8 @@ def test_once(tmp_path, stock, monkeypatch):
     assert [r["v_15_kmh"] for r in d["runs"]] == [r["v_15_kmh"] for r in theirs["runs"]]
     page = (tmp_path / "campaign.watch.html").read_text()
     assert ", ended" in page
+    above = commands.run("watch", tmp_path, *given[2:])  # where the table of its runs lies: no log
+    assert above.exit_code == 0, above.stderr
     track.put("b.parquet", b"PAR1")
     done = commands.run(*given)  # its own page is in nobody's way
     assert done.exit_code == 3
