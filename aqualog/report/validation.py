@@ -91,7 +91,7 @@ def _sentence(found: Validity, method: str, vehicle: str) -> str:
     if method == "boundary":
         said = f"is within the boundaries {percent(found.share)} of the time"
         if found.worst is not None:
-            said += f", worst {_worst_text(found.worst, many=len(found.traces) > 1)}"
+            said += f", farthest beyond them {_worst_text(found.worst, many=len(found.traces) > 1)}"
     elif found.rated:
         least = min(found.rated, key=lambda r: r.total)
         said = f"is rated {found.total:.2f} over {counted(len(found.rated), 'signal')}"
@@ -112,24 +112,17 @@ def _worst_text(w: Worst, *, many: bool) -> str:
 def _limit_text(x: Limit) -> str:
     on = "on dry road" if x.condition == "dry" else x.condition
     low, high, above = (KMH * v for v in (x.low, x.high, x.above))
-    if above - low < 0.2 * (high - low) or above - low < 1.0:
+    if above == low:
         return f"not valid {on} ({low:.0f} to {high:.0f} km/h)"
     return f"not valid above {above:.0f} km/h {on}"
 
 
 # --- sections --------------------------------------------------------------------------------------------------------
 
-_PLOTS = ("Signal", "Over", ("Within the boundaries", "within"), "Worst", "Tolerance", "From")
+_PLOTS = ("Signal", "Over", ("Within the boundaries", "within"), "Farthest beyond", "Tolerance", "From")
 _RATINGS = (
-    "Signal",
-    "Rating",
-    "Corridor",
-    "Phase",
-    "Magnitude",
-    "Slope",
-    ("Simulation late [s]", "late [s]"),
-    "Time [s]",
-)
+    "Signal", "Rating", "Corridor", "Phase", "Magnitude", "Slope", ("Simulation late [s]", "late [s]"), "Time [s]",
+)  # fmt: skip
 _LIMITS = ("Condition", ("Driven [km/h]", "km/h"), "Valid", ("Within the boundaries", "within"), "Time [s]")
 
 
@@ -203,7 +196,8 @@ def _plot_row(found: Validity, r: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _limit_row(x: Limit) -> tuple[str, ...]:
     valid = "at all speeds" if x.is_valid else _limit_text(x)
-    return x.condition, f"{KMH * x.low:.0f} to {KMH * x.high:.0f}", valid, percent(x.share), f"{x.seconds:.0f}"
+    share = percent(x.share) + ("" if x.is_valid or x.above == x.low else " above it")
+    return x.condition, f"{KMH * x.low:.0f} to {KMH * x.high:.0f}", valid, share, f"{x.seconds:.0f}"
 
 
 def _facts(d: Mapping[str, Any]) -> list[tuple[str, str]]:

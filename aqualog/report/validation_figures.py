@@ -9,7 +9,7 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.report.figures import axis, dots, figure, line
 from aqualog.report.theme import INK, MUTED, THRESHOLD, wheel_colour
-from aqualog.report.values import pretty_unit
+from aqualog.report.values import cut, pretty_unit
 from aqualog.validate.boundary import Boundary, boundary
 from aqualog.validate.records import ABSCISSAE, SIGNALS, Judged, Trace, Validity
 
@@ -35,8 +35,8 @@ def _over_time(judged: Judged, found: Validity) -> dict[str, Any]:
     t, shown = trace.over["t"][here], trace.simulated[plot.y][here]
     measured = np.where(trace.judged, trace.measured[plot.y], np.nan)[here]
     edge = boundary(t, shown, plot.tolerance)
-    title = f"{plot.y}: {SIGNALS[plot.y].title}" + (f", {trace.name}" if len(found.traces) > 1 else "")
-    title += ", five minutes about the worst" if t.size < trace.judged.size else ""
+    title = f"{plot.y} of {cut(trace.name, 40)}" if len(found.traces) > 1 else f"{plot.y}: {SIGNALS[plot.y].title}"
+    title += ", 5 min about the worst" if t.size < trace.judged.size else ""  # beside the buttons of the plot
     return _drawn(title, edge, (t, shown), (t, measured), plot.y, "t")
 
 

@@ -29,6 +29,7 @@ LEAST_IN_BIN = 10  # blocks
 BRIDGED_S = 0.5  # [s] shorter stretches within part no stretch beyond
 LONGEST_S = 60.0  # [s] of a rated stretch
 MOVES = 6.0  # times eps_y from the least to the greatest value of a stretch that is rated
+LEAST_VALID = 1.0 / 3.6  # [m/s] a range of speed that counts as valid, at least; and a fifth of what was driven
 LEAST_BEYOND_S = 2.0  # [s] more than the agreed share allows, before a part of the speeds is not valid
 
 
@@ -242,6 +243,8 @@ def _limit(condition: str, v: FloatArray, bad: BoolArray, agreed: float, step: f
     tail = np.cumsum((bad.astype(np.float64) - (1.0 - agreed))[::-1])[::-1] * step
     i = int(np.argmax(tail))
     low, high, seconds = float(v[0]), float(v[-1]), v.size * step
+    if v[i] - low < max(0.2 * (high - low), LEAST_VALID):
+        i = 0  # what is left below is no range of its own
     if tail[i] < LEAST_BEYOND_S and 1.0 - bad.mean() >= agreed:
         return Limit(condition, math.nan, low, high, float(1.0 - bad.mean()), seconds)
     return Limit(condition, float(v[i]), low, high, float(1.0 - bad[i:].mean()), seconds)

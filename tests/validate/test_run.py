@@ -85,6 +85,8 @@ def test_the_speed_of_the_limit():
     assert found.share == 0.0
     assert (found.low, found.high, found.seconds) == (0.0, 49.5, 50.0)
     assert _limit("dry", v, v == 49.0, 0.95, 0.5).is_valid  # one block is less than two seconds
+    early = _limit("dry", v, v >= 5.0, 0.95, 0.5)  # below is no range of its own: the share is that of all
+    assert (early.above, early.share) == (0.0, pytest.approx(0.1))
     # but a drive of which less than the agreed share is within is not called valid, however short
     short = _limit("dry", v[:20], v[:20] >= 9.0, 0.95, 0.1)
     assert (short.above, short.share) == (9.0, 0.0)
