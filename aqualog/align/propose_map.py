@@ -217,20 +217,8 @@ def _speed_hint(unmapped: Sequence[str]) -> str:
 
 
 _NO_ROAD_SPEED = {
-    "wheel",
-    "whl",
-    "engine",
-    "fan",
-    "wind",
-    "accuracy",
-    "limit",
-    "motor",
-    "rad",
-    "set",
-    "cruise",
-    "ui",
-    "steer",
-}
+    "wheel", "whl", "engine", "fan", "wind", "accuracy", "limit", "motor", "rad", "set", "cruise", "ui", "steer",
+}  # fmt: skip
 
 
 def _unmapped(kinds: _Kinds, mapped: Sequence[tuple[str, ...]]) -> tuple[str, ...]:

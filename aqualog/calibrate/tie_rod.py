@@ -137,7 +137,7 @@ def fit_tie_rod(
     if float(np.std(y)) < F_Y_RANGE_MIN:
         raise FitError(
             f"the front wheels' lateral force varies by {float(np.std(y)):.0f} N rms",
-            expected=f"{F_Y_RANGE_MIN:g} N for a tie-rod polynomial", hint="a dry slalom with 2 m/s^2",
+            expected=f"{F_Y_RANGE_MIN:g} N for a polynomial of it", hint="a dry slalom with 2 m/s^2",
         )  # fmt: skip
     has_x = float(np.std(x)) >= F_X_RANGE_MIN
     scale = float(np.std(y))

@@ -149,6 +149,7 @@ def convert(values: NDArray[np.float64], source: str, target: str, *, where: str
     return (values * (a.factor / b.factor)) + (a.offset - b.offset) / b.factor
 
 
+_SHOWN = {"nats": "natural units", "-": "–", "degC": "°C"}
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -157,10 +158,8 @@ def displayed_unit(unit: str) -> str:
 
     For display only: JSON values and CSV headers keep the spelling of the contract.
     """
-    if unit == "nats":
-        return "natural units"
-    if unit == "-":
-        return "–"
+    if unit in _SHOWN:
+        return _SHOWN[unit]
     return re.sub(r"\^(-?\d+)", lambda power: power[1].translate(_RAISED), unit).replace("*", "·")
 
 

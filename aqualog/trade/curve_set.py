@@ -129,7 +129,7 @@ def curve_set(
     return CurveSet(
         v, *curves, good.means(good.dry), own[0], interval(0), Estimate(own[0], float(spread[0]) ** 2, dof),
         (own[1], interval(1)), (own[2], interval(2)), (own[3], interval(3)), len(passes), int(good.v.size),
-        _notes(good, v, own, between, limits),
+        _notes(good, v, own, between, limits, is_low=bool(curves[0][0] <= 0.5 * good.means(good.dry)[0])),
     )  # fmt: skip
 
 
@@ -215,9 +215,11 @@ def _draws(good: _Steps, v: FloatArray, limits: CurveLimits, result: CurveResult
 
 
 def _notes(
-    good: _Steps, v: FloatArray, own: tuple[float, float, float, float], between: Interval, limits: CurveLimits
-) -> tuple[str, ...]:
-    notes = []
+    good: _Steps, v: FloatArray, own: tuple[float, float, float, float], between: Interval, limits: CurveLimits,
+    *, is_low: bool,
+) -> tuple[str, ...]:  # fmt: skip
+    """What a reader must know; `is_low`: the slowest passes have less than half of the dry lateral acceleration."""
+    notes, slow = [], f"{3.6 * v[0]:.0f} km/h"
     few = [f"{s:g} km/h" for s in np.unique(good.step) if (good.step == s).sum() < limits.passes]
     if few:
         notes.append(f"fewer than {limits.passes:g} passes at {', '.join(few)}")
@@ -225,6 +227,12 @@ def _notes(
         notes.append("the sets have no speed in common")
     elif between[1] <= between[0]:
         notes.append("the sets have one speed in common: no area")
+    if v.size > 1 and own[1] == v[0]:
+        notes.append(
+            f"the mean lateral acceleration is greatest in the slowest passes, {slow}: slower ones may have more"
+        )
+    if is_low:
+        notes.append(f"the least lateral acceleration is below half of the dry one from {slow} on")
     if not math.isfinite(own[3]):
         notes.append(f"the least lateral acceleration does not reach 0 up to {3.6 * v[-1]:.0f} km/h")
     return tuple(notes)

@@ -118,17 +118,9 @@ def test_document_of_clocks(tmp_path):
 
 def test_documents_that_are_files(tmp_path):
     printed(
-        "detect",
-        MF4,
-        *CAR,
-        "--json",
-        "-o",
-        tmp_path / "out",
-        "--history",
-        tmp_path / "slopes.json",
-        "--configuration",
-        "x",
-    )
+        "detect", MF4, *CAR, "--json", "-o", tmp_path / "out", "--history", tmp_path / "slopes.json",
+        "--configuration", "x",
+    )  # fmt: skip
     assert complaints("detect", json.loads((tmp_path / "out" / "events.json").read_text())) == []
     assert complaints("history", json.loads((tmp_path / "slopes.json").read_text())) == []
     known = {c.name for t in TABLES if t.name == "signals.parquet" for c in t.columns}

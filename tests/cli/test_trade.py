@@ -15,15 +15,8 @@ from tests.trade.made import FWD, straight
 
 LOG, CAR = ROOT / "sample_logs" / "lane_drive.mf4", ROOT / "sample_logs" / "vehicle.toml"
 UNITS = {
-    "omega": "rad/s",
-    "torque": "N*m",
-    "v": "m/s",
-    "a": "m/s^2",
-    "yaw": "rad/s",
-    "water": "m",
-    "on": "",
-    "gear": "",
-}
+    "omega": "rad/s", "torque": "N*m", "v": "m/s", "a": "m/s^2", "yaw": "rad/s", "water": "m", "on": "", "gear": "",
+}  # fmt: skip
 
 
 def write(path, columns, rate=100.0):

@@ -144,6 +144,9 @@ def test_sets_that_do_not_meet():
 
 def test_a_set_without_valid_passes_and_one_of_single_passes():
     assert curve_set([CurvePass(reasons=("no",))], LIMITS, result="mean", between=(1.0, 2.0)).valid == 0
+    fast = curve_set(passes(speeds=(75, 80)), LIMITS, result="mean", between=(75 * KMH, 80 * KMH))
+    assert "slowest passes, 75 km/h: slower ones may have more" in " ".join(fast.notes)
+    assert "below half of the dry one from 75 km/h on" in " ".join(fast.notes)
     single = curve_set(passes()[::3], LIMITS, result="mean", between=(60 * KMH, 80 * KMH))
     assert single.result == pytest.approx(3.0)
     assert math.isnan(single.ci[0])

@@ -159,16 +159,10 @@ def _set(s: SetRow, test: TradeTest) -> dict[str, Any]:
 def _summary(s: Summary, kind: str) -> dict[str, Any]:
     stem = "_kmh" if kind == "straight" else ""
     return {
-        "runs": s.runs,
-        "valid": s.valid,
-        "censored": s.censored,
-        f"mean{stem}": plain(s.mean, 6),
-        "ci95": _pair(s.ci),
-        f"sd{stem}": plain(s.sd, 6),
-        "cv": plain(s.cv, 6),
-        f"above{stem}": plain(s.above, 6),
+        "runs": s.runs, "valid": s.valid, "censored": s.censored, f"mean{stem}": plain(s.mean, 6),
+        "ci95": _pair(s.ci), f"sd{stem}": plain(s.sd, 6), "cv": plain(s.cv, 6), f"above{stem}": plain(s.above, 6),
         "enough": s.is_enough,
-    }
+    }  # fmt: skip
 
 
 def _curve(c: CurveSet) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 from aqualog.report.campaign.labels import group_text
 from aqualog.report.figures import PALETTE, axis, dots, error_bars, figure, line
 from aqualog.report.theme import INK, MUTED
-from aqualog.report.values import KMH, plot_text
+from aqualog.report.values import KMH, plot_text, pretty_unit
 from aqualog.trade.curve import CurvePass
 from aqualog.trade.curve_set import RESULTS
 from aqualog.trade.evaluation import SetRow, TradeTest
@@ -18,6 +18,7 @@ from aqualog.trade.straight import StraightRun
 
 __all__ = ["trade_figures"]
 
+_CONTROLS = (INK, MUTED)  # the control of one configuration, and of the next
 _MOST_CURVES = 60  # runs whose slip is drawn
 _UNIT = {"straight": "speed of 15 % slip [km/h]", "braking": "braking force coefficient [-]"}
 
@@ -35,10 +36,9 @@ def trade_figures(test: TradeTest) -> dict[str, Any]:
 
 
 def _colour(test: TradeTest, s: SetRow) -> str:
-    if s.is_control:
-        return INK
-    others = [r.group for r in test.sets if not r.is_control]
-    return PALETTE[others.index(s.group) % len(PALETTE)]
+    alike = [r.group for r in test.sets if r.is_control == s.is_control]
+    colours = _CONTROLS if s.is_control else PALETTE
+    return colours[alike.index(s.group) % len(colours)]
 
 
 def _order(test: TradeTest) -> dict[str, Any] | None:
@@ -59,8 +59,9 @@ def _order(test: TradeTest) -> dict[str, Any] | None:
                     hovertemplate="%{x}: %{y:.4g}<extra>%{fullData.name}</extra>",
                 ))  # fmt: skip
     data += _control_lines(test)
-    title = "in the order of the runs, and the drift of the control" if test.controls else "in the order of the runs"
-    return figure(data, title, axis("run"), axis(_UNIT[test.options.kind])) if data else None
+    noun = "stop" if test.options.kind == "braking" else "run"
+    title = f"in the order of the {noun}s" + (", and the drift of the control" if test.controls else "")
+    return figure(data, title, axis(noun), axis(_UNIT[test.options.kind])) if data else None
 
 
 def _control_lines(test: TradeTest) -> list[dict[str, Any]]:
@@ -68,10 +69,11 @@ def _control_lines(test: TradeTest) -> list[dict[str, Any]]:
     return [
         line(
             f"{c.control.name} between its sets" + (f", {group_text(c.rest)}" if c.rest else ""),
-            [b.order + 1.0 for b in c.control.blocks], [b.estimate.value for b in c.control.blocks], MUTED, width=1.5,
+            [b.order + 1.0 for b in c.control.blocks], [b.estimate.value for b in c.control.blocks],
+            _CONTROLS[i % len(_CONTROLS)], width=1.5,
             style={"dash": "dash"}, mode="lines+markers",
         )
-        for c in test.controls
+        for i, c in enumerate(test.controls)
     ]  # fmt: skip
 
 
@@ -89,12 +91,8 @@ def _order_of_sets(test: TradeTest) -> dict[str, Any] | None:
             hovertemplate="%{y:.4g}<extra>%{fullData.name}</extra>",
         ))  # fmt: skip
     data += _control_lines(test)
-    unit = RESULTS[test.options.result][0]
-    return (
-        figure(data, "sets in the order of the passes", axis("pass"), axis(f"{test.options.result} [{unit}]"))
-        if data
-        else None
-    )
+    y = axis(f"{test.options.result} [{pretty_unit(RESULTS[test.options.result][0])}]")
+    return figure(data, "sets in the order of the passes", axis("pass"), y) if data else None
 
 
 def _index(test: TradeTest) -> dict[str, Any] | None:

@@ -87,7 +87,8 @@ def trade_report(test: TradeTest) -> Report:
               if len(test.entries) > _MOST_RUNS else []),
         ], "runs-section"),
         Section("Not checked", [Lines(_unchecked(test), most=20)], "unchecked"),
-        Section("Thresholds", [_limits(test), Lines(_limits_text(test), where="text")], "limits-section"),
+        Section("Thresholds", [_limits(test), Lines(_limits_text(test), where="text")], "limits-section",
+                "source K: general knowledge"),
     ]  # fmt: skip
     facts = [
         (_NOUNS[kind] + ("es" if kind == "curve" else "s"), str(len(test.entries))), ("valid", str(test.valid)),
@@ -186,19 +187,15 @@ def _legend(test: TradeTest) -> str:
 
 def _control_lines(test: TradeTest) -> list[Line]:
     lines: list[Line] = []
+    noun = _NOUNS[test.options.kind]
     decimals = 3 if test.options.kind == "braking" else 2 if test.options.kind == "curve" else 1
     for c in test.controls:
         name = c.control.name + (f", {group_text(c.rest)}" if c.rest else "")
-        values = "; ".join(
-            f"{b.estimate.value:.{decimals}f} ({counted(b.runs, 'run')})" for b in c.control.blocks
-        )  # fmt: skip
-        lines.append((name, f"in the order of the runs: {values}"))
+        values = "; ".join(f"{b.estimate.value:.{decimals}f} ({_several(b.runs, noun)})" for b in c.control.blocks)
+        lines.append((name, f"in the order of the {_several(2, noun)[2:]}: {values}"))
         if c.drift is not None:
             low, high = c.drift.ci
-            sure = (
-                "" if not math.isfinite(low) else
-                "; not different from none" if low <= 0.0 <= high else "; taken out of the index"
-            )  # fmt: skip
+            sure = f"; {'not different from none, yet ' if low <= 0.0 <= high else ''}taken out of the index"
             told = f"{100.0 * c.drift.change:+.1f} % from the first to the last set"
             lines.append(("drift", f"{told} ({_ends(c.drift.ci, 1, 100.0)} %){sure}"))
     return lines
