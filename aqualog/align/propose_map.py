@@ -191,8 +191,11 @@ def lacking_notes(found: Collection[str], unmapped: Sequence[str]) -> list[str]:
     if missing:
         notes.append(f"no channel looks like {', '.join(missing)}: aquaplaning cannot be detected without")
     if not any(s.startswith("torque_") for s in found):
+        torques = (n for n, dimension in _dimensions(unmapped) if dimension == "torque")
+        motors = [n for n in torques if MOTOR & set(words_of(n.partition(" [")[0]))]
+        own = f": {', '.join(motors[:3])}" if motors else ""
         notes.append(
-            "no torque of wheels or axles: traction and slip slope need one (a driveline torque with its scale)"
+            f"no torque of wheels or axles: traction and slip slope need one (a driveline torque with its scale{own})"
         )
 
     if "v_x" not in found:
@@ -203,19 +206,27 @@ def lacking_notes(found: Collection[str], unmapped: Sequence[str]) -> list[str]:
 def _speed_hint(unmapped: Sequence[str]) -> str:
     """Name the channels, `name [unit]`, that may be the speed over ground: those with a unit of speed first."""
     speeds, bare = [], []
-    for name, _, unit in (n.removesuffix("]").partition(" [") for n in unmapped):
-        words = set(words_of(name))
+    for name, dimension in _dimensions(unmapped):
+        words = set(words_of(name.partition(" [")[0]))
         if not {"speed", "velocity"} & words or (_NO_ROAD_SPEED | NOT_A_VALUE) & words:
             continue
-        if unit and is_unit(unit) and parse_unit(unit).dimension == "speed":
-            speeds.append(f"{name} [{unit}]")
-        elif not unit:
+        if dimension == "speed":
+            speeds.append(name)
+        elif not dimension:
             bare.append(name)
     if speeds:
         return f"; {', '.join(speeds[:3])} may be it: map it if it is not made from the wheels"
     return f"; {', '.join(bare[:3])} may be it, but the file gives no unit: map it with its unit" if bare else ""
 
 
+def _dimensions(channels: Sequence[str]) -> list[tuple[str, str]]:
+    """Each `name [unit]` with the dimension of its unit: empty where it has none, `?` where none knows it."""
+    units = [(n, n.removesuffix("]").partition(" [")[2]) for n in channels]
+    return [(n, "" if not u else parse_unit(u).dimension if is_unit(u) else "?") for n, u in units]
+
+
+MOTOR = {"motor", "mot", "engine", "eng", "machine", "antrieb"}
+"""Words of a motor's channels."""
 _NO_ROAD_SPEED = {
     "wheel", "whl", "engine", "fan", "wind", "accuracy", "limit", "motor", "rad", "set", "cruise", "ui", "steer",
 }  # fmt: skip

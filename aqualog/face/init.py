@@ -332,15 +332,13 @@ def _answered(
 def _motor_torque(contents: Contents, proposals: Mapping[str, Proposal]) -> ChannelOverview | None:
     """Return the torque of a motor that is in the log, where no torque of wheels is."""
     from aqualog.align.propose import words_of
+    from aqualog.align.propose_map import MOTOR
     from aqualog.core.units import is_unit, parse_unit
 
     if any(s.startswith("torque_") for s in proposals):
         return None
     torques = (o for o in contents.overviews if is_unit(o.unit) and parse_unit(o.unit).dimension == "torque")
-    return next((o for o in torques if _MOTOR & set(words_of(o.name)) and o.low < o.high), None)
-
-
-_MOTOR = {"motor", "mot", "engine", "eng", "machine", "antrieb"}
+    return next((o for o in torques if MOTOR & set(words_of(o.name)) and o.low < o.high), None)
 
 
 def _marks(contents: Contents, proposals: Mapping[str, Proposal]) -> Iterator[str]:

@@ -119,6 +119,7 @@ def test_without_an_answer_the_place_is_marked(tmp_path):
     start = aq.init(ev(tmp_path / "ev.csv"), tmp_path / "work", ask=lambda _: "")
     assert "torque_r" not in start.proposals
     start.write_files()
+    assert "(a driveline torque with its scale: Motor Torque [Nm])" in start.text()
     assert '# SET torque_r = { channel = "Motor Torque", scale = ... }' in (tmp_path / "work" / "map.toml").read_text()
 
 
