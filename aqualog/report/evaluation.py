@@ -57,6 +57,7 @@ _SCORES = (
 )  # fmt: skip
 _ROC = ("Detector", "Times", "Threshold", "Full", "Partial", "False alarms", ("Per hour (95 %)", "per h (95 %)"))
 _MATRICES = ("recall-matrix", "alarm-matrix")
+_CONFUSION = "Stretches with an event, also one that goes on from the stretch before; new events per hour"
 _NOTHING = ("", "-", "–", "- / -", "–/h")
 _FOOTER = (
     "Intervals: Wilson [wilson1927] for shares, exact Poisson [garwood1936] for rates, 95 %. A false alarm is an event "
@@ -88,7 +89,7 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = (), gates: 
     tuned = tuning_sentences(tuning, score_all(tuning.before), scores) if tuning else []
     sections = [
         Section("", [
-            Para(f"{len(records)} drives, {sum(r.duration_s for r in records) / HOUR_S:.3g} h", where="text"),
+            Para(f"{counted(len(records), 'drive')}, {sum(r.duration_s for r in records) / HOUR_S:.3g} h", "text"),
             Lines(answers or [headline(evaluation)]),
         ], where="text"),
         Section("", [Headline(headline(evaluation), answers)], "verdict", look="verdict open", where="page"),
@@ -109,8 +110,8 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = (), gates: 
         ),
         Section("By configuration", [_configurations(groups)], "group-section", where="page",
                 fold=counted(len(groups), "configuration")),
-        Section("Confusion", [_confusion(records)], "confusion-section", "episodes with an event, and events per hour",
-                fold="each detector by what was there"),
+        Section("Confusion", [_confusion(records), Para(f"{_CONFUSION}.", where="text")], "confusion-section",
+                _CONFUSION, fold="each detector by what was there"),
         Section("Over thresholds and time", [Figures([n for n in plots if n not in _MATRICES])], "plot-section",
                 fold="curves"),
         *_situation_sections(records, situations),

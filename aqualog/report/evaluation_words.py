@@ -122,7 +122,7 @@ def _against(s: Score) -> str:
     if alarms.seconds > 0.0 and alarms.per_hour_ci95[1] > target:
         return (
             "targets met, but so few hours only show that false alarms are below "
-            f"{alarms.per_hour_ci95[1]:.2g} per hour ({3.7 / target:.0f} h without one would show {target:g})"
+            f"{short(alarms.per_hour_ci95[1])} per hour ({3.7 / target:.0f} h without one would show {target:g})"
         )
     return "all targets are met"
 
