@@ -143,5 +143,6 @@ def _checked(
     away = np.abs((smooth if np.isfinite(smooth).any() else steer[inside]) - dry)
     share = float(np.nanmax(away)) / abs(dry) if dry else math.inf
     if share > limits.steer:
-        reasons.append(f"the steering angle changes by {100 * share:.0f} % in the trough: it is not constant")
+        told = f"by {100 * share:.0f} %" if share < 10.0 else "to more than ten times of it"
+        reasons.append(f"the steering angle changes {told} in the trough: it is not constant")
     return replace(found, steer=share, reasons=tuple(reasons), notes=tuple(notes))

@@ -93,22 +93,15 @@ def _run(e: Entry) -> dict[str, Any]:
 def _straight(e: Entry, r: StraightRun) -> dict[str, Any]:
     onset = {} if e.onset is None else e.onset.speeds
     return {
-        "v_15_kmh": _kmh(r.v),
-        "censored": r.is_censored,
+        "v_15_kmh": _kmh(r.v), "censored": r.is_censored,
         **{f"{n}_kmh": _kmh(r.speeds.get(n, np.nan)) for n in LEVELS if n != "v_15"},
         **{f"v_{n}_kmh": _kmh(onset.get(n, np.nan)) for n in SIGNS},
-        "onset_missing": None if e.onset is None else dict(e.onset.missing),
-        "reference": r.reference or None,
-        "other_reference": r.other or None,
-        "v_15_other_kmh": _kmh(r.speeds_other.get("v_15", np.nan)),
-        "a_x": plain(r.a_x, 6),
-        "yaw_rate": plain(r.yaw_rate, 6),
-        "radius_ratio": plain(r.ratio),
-        "wet_side": r.wet_side,
-        "axle": r.axle or None,
-        "crossing_s": plain(r.t_15, 6),
+        "onset_missing": None if e.onset is None else dict(e.onset.missing), "reference": r.reference or None,
+        "other_reference": r.other or None, "v_15_other_kmh": _kmh(r.speeds_other.get("v_15", np.nan)),
+        "a_x": plain(r.a_x, 6), "yaw_rate": plain(r.yaw_rate, 6), "radius_ratio": plain(r.ratio),
+        "wet_side": r.wet_side, "axle": r.axle or None, "crossing_s": plain(r.t_15, 6),
         "lane_s": None if r.lane is None else list(r.lane),
-    }
+    }  # fmt: skip
 
 
 def _pass(p: CurvePass) -> dict[str, Any]:
@@ -168,10 +161,7 @@ def _summary(s: Summary, kind: str) -> dict[str, Any]:
 def _curve(c: CurveSet) -> dict[str, Any]:
     speeds = {"v_greatest": c.v_greatest, "v_half": c.v_half, "v_zero": c.v_zero}
     return {
-        "runs": c.passes,
-        "valid": c.valid,
-        "value": plain(c.result, 6),
-        "ci95": _pair(c.ci),
+        "runs": c.passes, "valid": c.valid, "value": plain(c.result, 6), "ci95": _pair(c.ci),
         **{f"{n}_kmh": _kmh(v) for n, (v, _) in speeds.items()},
         **{f"{n}_kmh_ci95": _pair(ci, KMH) for n, (_, ci) in speeds.items()},
         "curve": {
