@@ -12,13 +12,9 @@ __all__ = ["DOCS", "SECTIONS", "Hit", "Topic", "find", "nearest", "plain", "sear
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 
 SECTIONS = {
-    "": "Start",
-    "guide": "Guide",
-    "method": "Method",
-    "reference": "Reference",
-    "validation": "Validation",
+    "": "Start", "guide": "Guide", "method": "Method", "reference": "Reference", "validation": "Validation",
     "decisions": "Decisions",
-}
+}  # fmt: skip
 """Folders of pages and their names, in the order in which a name that stands in two of them is looked for."""
 
 _PAGE = re.compile(r"\]\(([^)#\s]+\.md)")

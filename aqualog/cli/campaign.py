@@ -114,7 +114,7 @@ def bin_slipslope(run: Run, by: str, width: float, road: str, robust: bool, tabl
     expects. Logs that have no results yet are run first, as `aqualog batch` does. The delay of v_x is estimated and
     taken off. --by side puts the wheels of a side together.
 
-    JSON: rows, dry, delays, full_aquaplaning (from the slopes, from minor and from full spin-downs), spin_ups,
+    JSON: rows, dry, delays, full_aquaplaning (from slopes, minor and full spin-downs, margin), spin_ups,
     minor_spin_downs.
 
     \b

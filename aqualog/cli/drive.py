@@ -123,6 +123,7 @@ def _history_notes(result: Detection, path: Path | None, configuration: str) -> 
     used = sum(len(memory.history.of(name, s.place)) for s in slopes)
     added = sum(len(s.periods) for s in slopes)
     text = f'history {path}: {used} periods of "{name}" known, {added} of this drive written'
+    text += "" if added else ", where a period takes 5 s of estimates on dry road"
     if name in known or not known:
         return [text]
     shown = ", ".join(f'"{n}"' for n in known[:5]) + (", ..." if len(known) > 5 else "")

@@ -134,7 +134,8 @@ def _from_list(path: Path) -> list[Path]:
     try:
         lines = _text_of_list(path).splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"list of logs cannot be read ({error})", where=str(path)) from error
+        why = getattr(error, "strerror", None) or error
+        raise ConfigError(f"list of logs cannot be read ({why})", where=str(path)) from error
     names = [line.strip() for line in lines if line.strip() and not line.lstrip().startswith("#")]
     odd = next((n for n in names if n.startswith("@") or "\0" in n), None)
     if odd is not None:

@@ -91,14 +91,14 @@ class Contents(Result):
 
     def text(self) -> str:
         from aqualog.report.text import table
-        from aqualog.report.values import CELL, NOTE, cut
+        from aqualog.report.values import CELL, NOTE, counted, cut
 
         lines = []
         by_channel = {p.entry.channel[0]: s for s, p in self.proposals.items()}
         for path, kind in zip(self.drive.paths, self.formats, strict=True):
             own = [o for o in self.overviews if o.file == path.name]
             clock = "absolute time" if path.name in self.absolute else "a clock of its own"
-            lines.append(f"{cut(path.name, CELL)}: {kind.upper()}, {len(own)} channels, {clock}")
+            lines.append(f"{cut(path.name, CELL)}: {kind.upper()}, {counted(len(own), 'channel')}, {clock}")
             if own:
                 rows = [_row(o, by_channel) for o in own]
                 lines += [table(_HEADER, rows), ""]

@@ -44,7 +44,7 @@ def examination_report(found: Examination) -> Report:
     """The files, problems by weight, and the detectors that can run."""
     files = []
     for f in found.files:
-        read = f", {f.channels} channels, {f.samples:,} samples, {f.end_s or 0.0:.1f} s" if f.format else ""
+        read = f", {counted(f.channels, 'channel')}, {f.samples:,} samples, {f.end_s or 0.0:.1f} s" if f.format else ""
         files.append(f"{cut(f.file, CELL)}: {f'{f.format.upper()}, ' if f.format else ''}{f.size:,} bytes{read}")
     lacks = [(name, signals) for name, signals in found.missing if signals]
     closing = "no problem found" if not found.findings else ""
