@@ -42,7 +42,10 @@ def changed(**columns):
 
 T = np.arange(0.0, 8.0, 0.01)
 ODD = {
-    "no steering": (changed(steer_angle=np.where(T > 5.2, 0.04, 1e-7)), "changes to more than ten times of it in the trough"),
+    "no steering": (
+        changed(steer_angle=np.where(T > 5.2, 0.04, 1e-7)),
+        "changes to more than ten times of it in the trough",
+    ),
     "steering": (changed(steer_angle=np.where(T > 5.2, 0.04, 0.03)), "steering angle changes by 33 %"),
     "speed": (changed(v_x=80 * KMH + np.where(T < 5.0, T - 4.0, 1.0)), "the speed changes by"),
     "straight": (changed(a_y=np.zeros(T.size)), "no curve"),
