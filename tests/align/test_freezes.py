@@ -104,6 +104,19 @@ def test_a_sensor_of_the_body_that_stands_still_is_dead_at_zero_too(name, value)
     assert found(t, np.round(x, 0), name) == ()  # too coarse to be judged
 
 
+@pytest.mark.parametrize("pieces", [1, 7, 1000])
+@pytest.mark.parametrize(("name", "step"), [("v_x", 0.1 / 3.6), ("a_y", 0.05), ("yaw_rate", 0.004)])
+def test_a_coarse_signal_stands_by_itself_in_even_driving(name, step, pieces):
+    """At constant speed on a straight road or a test bench its noise is smaller than its step, elsewhere it is not."""
+    t = moving(seconds=180.0)[0]
+    uneven = np.interp(t / S, [0, 50, 70, 110, 130, 180], [1, 1, 0, 0, 1, 1])
+    noise = (0.05 + uneven) * step * np.random.default_rng(2).standard_normal(t.size)
+    x = np.round((20.0 * (name == "v_x") + noise) / step) * step
+    assert found(t, x, name, pieces) == ()
+    x[1000:3001] = x[9000] + 30.0 * step  # now it is dead: it comes and goes by more
+    assert found(t, x, name, pieces) == ((t[1000], t[3000]),)
+
+
 def test_a_single_sample_and_none():
     watch = FreezeWatch(3.0, 2.0, 0.03)
     assert watch.finish() == ()
