@@ -66,7 +66,7 @@ _SLOW = 0.02  # of the time outside
 _CREEP_S = 1.0  # [s] a stop of which the car moves for less is one at rest
 _STANDING = 0.5  # [m/s]
 _STOPPING = 20.0  # [m/s^2] a speed that falls to zero faster is lost, and no car that stops
-_SLACK = 1.0  # [m/s] of resolution and jitter
+_SLACK = 2.0  # [m/s] of resolution and jitter; slower, wheel speed sensors may tell zero
 _PAUSE_NS = 2_500_000_000  # GNSS tells its speed once a second
 _AT_REST = (3, 1.0)  # more stops of so many seconds at the same value: where the signal rests (a pedal, an idle torque)
 

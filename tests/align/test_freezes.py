@@ -216,12 +216,12 @@ def test_no_detector_alarms_on_spikes_of_the_accelerometer(height, samples, soun
 
 
 def stop_and_go(name, is_standing, steady="torque_r"):
-    """Two minutes at a light at which a signal stays the same; or that signal alone stays."""
+    """Two minutes at a light at which a signal stays the same; or that signal alone stays. Slow wheels show nothing."""
     rng = np.random.default_rng(7)
     t = np.arange(40_000) * 0.01
     v = 20.0 * (np.interp(t, [0, 90, 100, 220, 230, 400], [1, 1, 0, 0, 1, 1]) if is_standing else np.ones(t.size))
     t_ns = np.round(t * S).astype(np.int64)
-    noisy = np.where(v > 0.0, v + 0.02 * rng.standard_normal(t.size), 0.0)
+    noisy = np.where(v > 1.8, v + 0.02 * rng.standard_normal(t.size), 0.0)
     torque = np.where((t > 101) & (t < 219), 14.5, np.round(100.0 + 30.0 * rng.standard_normal(t.size), 1))
     return {
         name: (t_ns, noisy / (1.0 if name == "v_x" else 0.3)),
