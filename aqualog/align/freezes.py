@@ -165,6 +165,17 @@ class FreezeWatch:
         self._changes += changes.size
         self._smallest = min(self._smallest, float(np.abs(changes).min()))
 
+    @property
+    def is_noisy(self) -> bool:
+        """Whether the signal has noise of its own, so that a sensor made it."""
+        return self._changes >= _LEAST_CHANGES and self._turns >= _NOISE * self._changes
+
+    @property
+    def whole(self) -> Freeze | None:
+        """The whole log if the signal keeps one value in it, without a gap."""
+        is_even = self._t.size > 0 and not (self._changes or self._long)
+        return (self._since - 1, int(self._t[0])) if is_even else None
+
     def finish(self) -> tuple[Freeze, ...]:
         """List the stretches in which the signal is frozen, in order."""
         if self._asleep is None:
@@ -175,8 +186,7 @@ class FreezeWatch:
         long = list(self._long)
         if self._t.size and self._t[0] - self._since >= self._least_ns and abs(self._x[0]) > self._standing:
             long.append((self._since, int(self._t[0]), self._into, np.nan))
-        is_noisy = self._changes >= _LEAST_CHANGES and self._turns >= _NOISE * self._changes
-        if not long or not is_noisy or self._smallest > self._coarsest:
+        if not long or not self.is_noisy or self._smallest > self._coarsest:
             return ()
         # a coarse signal may stand by itself: it comes and goes by its finest step, a sensor that wakes up does not
         by = np.array(long)[:, 2:]

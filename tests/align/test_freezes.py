@@ -281,3 +281,12 @@ def test_a_speed_that_never_changes_was_not_measured(value, sway, until, is_dead
     whole = in_both_ways(signals)
     assert ("omega_rl" not in whole.symbols) is is_dead
     assert any("omega_rl" in n and "is frozen there" in n for n in whole.quality.notes) is is_dead
+
+
+@pytest.mark.parametrize("is_calculated", [True, False])
+@pytest.mark.parametrize("value", [0.0, -1.2])
+def test_an_acceleration_that_never_changes_was_not_measured(value, is_calculated):
+    """Unless nothing in the log has noise."""
+    t, v = moving(noise=0.02 * (not is_calculated))
+    whole = in_both_ways({"v_x": (t, v), "omega_fl": (t, v / 0.3), "a_x": (t, np.full(t.size, value))})
+    assert ("a_x" in whole.symbols) is is_calculated
