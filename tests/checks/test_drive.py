@@ -134,3 +134,11 @@ def test_beyond_the_limits_of_the_vehicle_file_the_map_is_in_doubt():
     assert remark.advice.endswith(" times too large")
     assert "torque_gain =" not in remark.sentence
     assert "mass =" not in remark.sentence
+
+
+@pytest.mark.parametrize(("offset", "is_named"), [(0.0, False), (2.5e5, False), (3.5e5, True), (50e5, True)])
+def test_a_brake_that_acts_on_a_car_that_does_not_slow_down(offset, is_named):
+    columns = made(seconds=30.0)
+    braking = np.gradient(columns["v_x"], 0.05) < -0.5
+    remarks = look(signals({**columns, "brake_pressure": offset + 30e5 * braking}), CAR)
+    assert [r.signals for r in remarks if "bar" in r.what] == [("brake_pressure",)] * is_named
