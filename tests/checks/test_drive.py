@@ -7,6 +7,7 @@ import pytest
 
 from aqualog.checks.look import look
 from tests.checks.made import CAR, made, signals
+from tests.checks.test_signs import lines_for
 
 DRIVE = made(seconds=900.0, accelerating=0.8)
 TORQUES = ("torque_rl", "torque_rr")
@@ -56,10 +57,6 @@ def exchange(*pairs):
 
 def exchanged(columns, car=KNOWN, drop=()):
     return [r for r in look(signals(columns, drop=drop), car) if r.kind in ("exchange", "drivetrain")]
-
-
-def lines_for(*pairs):
-    return {f'{a} = {{ channel = "{b}" }}' for pair in pairs for a, b in (pair, pair[::-1])}
 
 
 def test_the_axle_that_slips_is_the_driven_one():
