@@ -49,7 +49,7 @@ class Pool(NamedTuple):
     step: NDArray[np.int64]
     columns: dict[str, FloatArray]
 
-    def part(self, which: NDArray[np.int64] | slice) -> Pool:
+    def part(self, which: NDArray[np.int64] | BoolArray | slice) -> Pool:
         """Some of the samples."""
         return Pool(self.run[which], self.step[which], {k: x[which] for k, x in self.columns.items()})
 
