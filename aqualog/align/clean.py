@@ -163,7 +163,7 @@ class Cleaner:
         r_e = vehicle.r_e(name[-2:]) if name.startswith("omega_") else None
         self._rule = glitches_of(name, r_e)
         self._unmeasured = unmeasured or Unmeasured()
-        self._watch = watch_of(name, r_e) if unmeasured is None else None
+        self.repeats = watch_of(name, r_e) if unmeasured is None else None
         self._lines = line_watch_of(name) if unmeasured is None else None
         # when the car stands by this signal, if it is a speed; complete once all samples of the first pass are through
         self.stands = stand_watch_of(name, r_e) if unmeasured is None else None
@@ -197,8 +197,8 @@ class Cleaner:
 
     def _let_through(self, t: TimeArray, x: FloatArray) -> Samples:
         self._through += t.size
-        if self._watch is not None:
-            self._watch.push(t, x)
+        if self.repeats is not None:
+            self.repeats.push(t, x)
         if self._lines is not None:
             self._lines.push(t, x)
         if self.stands is not None:
@@ -257,7 +257,7 @@ class Cleaner:
 
     def unmeasured(self) -> Unmeasured:
         """Return where no sensor made the signal; complete once all samples are through."""
-        frozen = self._unmeasured.frozen if self._watch is None else self._watch.finish()
+        frozen = self._unmeasured.frozen if self.repeats is None else self.repeats.finish()
         return Unmeasured(frozen, self._unmeasured.joined if self._lines is None else self._lines.finish())
 
     def cleaned(self, taken: Taken) -> tuple[Clean, list[str]]:

@@ -53,6 +53,7 @@ _OF_BODY = ("a_x", "a_y", "yaw_rate")
 _MOST_BETWEEN = 0.3  # [s] mean time between two changes of a signal that is judged
 _TIMES_LONGER = 20  # than that time
 _LEAST_CHANGES = 50
+_FINEST = 1.5  # times the finest step of a signal is still that step
 _NOISE = 0.05  # least share of steps against the step before: measured speeds have 0.11 and more
 _STILL = 3  # samples that repeat the first one, at least, of a sensor that is not awake yet
 _GAP_NS = 1_000_000_000
@@ -65,7 +66,7 @@ _SLOW = 0.02  # of the time outside
 _CREEP_S = 1.0  # [s] a stop of which the car moves for less is one at rest
 _STANDING = 0.5  # [m/s]
 _STOPPING = 20.0  # [m/s^2] a speed that falls to zero faster is lost, and no car that stops
-_SLACK = 1.0  # [m/s] of resolution and jitter
+_SLACK = 2.0  # [m/s] of resolution and jitter; slower, wheel speed sensors may tell zero
 _PAUSE_NS = 2_500_000_000  # GNSS tells its speed once a second
 _AT_REST = (3, 1.0)  # more stops of so many seconds at the same value: where the signal rests (a pedal, an idle torque)
 
@@ -110,7 +111,7 @@ class FreezeWatch:
         self._least_ns, self._standing, self._coarsest = round(least_s * 1e9), standing, coarsest
         self._t: TimeArray = np.zeros(0, dtype=np.int64)  # the last sample
         self._x: FloatArray = np.zeros(0)
-        self._since = 0
+        self._since, self._into = 0, np.nan
         self._sign = 0.0
         self._changes = self._turns = self._moving_ns = 0
         self._smallest = np.inf
@@ -118,7 +119,7 @@ class FreezeWatch:
         self._first_ns, self._still = 0, 0
         self._is_awake = r_e is None
         self._asleep: Freeze | None = None
-        self._long: list[Freeze] = []
+        self._long: list[tuple[int, int, float, float]] = []  # with the steps that lead to and from it; NaN: not known
 
     def push(self, t_ns: TimeArray, x: FloatArray) -> None:
         """Take samples (n,) at strictly increasing stamps, finite."""
@@ -139,7 +140,10 @@ class FreezeWatch:
             starts = np.append(np.int64(self._since), t[ends[:-1] + 1])
             self._since = int(t[ends[-1] + 1])
             found = (t[ends] - starts >= self._least_ns) & (np.abs(x[ends]) > self._standing)
-            self._long += list(zip(starts[found].tolist(), t[ends[found]].tolist(), strict=True))
+            by = np.append(self._into, np.where(dt[ends] > _GAP_NS, np.nan, np.abs(steps[ends])))
+            self._into = float(by[-1])
+            columns = starts, t[ends], by[:-1], by[1:]
+            self._long += list(zip(*(c[found].tolist() for c in columns), strict=True))
 
     def _wake(self, t: TimeArray, steps: FloatArray, dt: TimeArray) -> None:
         assert self._r_e is not None
@@ -161,6 +165,17 @@ class FreezeWatch:
         self._changes += changes.size
         self._smallest = min(self._smallest, float(np.abs(changes).min()))
 
+    @property
+    def is_noisy(self) -> bool:
+        """Whether the signal has noise of its own, so that a sensor made it."""
+        return self._changes >= _LEAST_CHANGES and self._turns >= _NOISE * self._changes
+
+    @property
+    def whole(self) -> Freeze | None:
+        """The whole log if the signal keeps one value in it, without a gap."""
+        is_even = self._t.size > 0 and not (self._changes or self._long)
+        return (self._since - 1, int(self._t[0])) if is_even else None
+
     def finish(self) -> tuple[Freeze, ...]:
         """List the stretches in which the signal is frozen, in order."""
         if self._asleep is None:
@@ -168,12 +183,16 @@ class FreezeWatch:
         return (self._asleep, *(f for f in self._frozen() if f[0] > self._asleep[1]))
 
     def _frozen(self) -> tuple[Freeze, ...]:
-        found = list(self._long)
+        long = list(self._long)
         if self._t.size and self._t[0] - self._since >= self._least_ns and abs(self._x[0]) > self._standing:
-            found.append((self._since, int(self._t[0])))
-        is_noisy = self._changes >= _LEAST_CHANGES and self._turns >= _NOISE * self._changes
-        if not found or not is_noisy or self._smallest > self._coarsest:
+            long.append((self._since, int(self._t[0]), self._into, np.nan))
+        if not long or not self.is_noisy or self._smallest > self._coarsest:
             return ()
+        # a coarse signal may stand by itself: it comes and goes by its finest step, a sensor that wakes up does not
+        by = np.array(long)[:, 2:]
+        is_own = (by <= _FINEST * self._smallest).all(axis=1)
+        is_own |= is_own.any() & ((by <= _FINEST * self._smallest) | np.isnan(by)).all(axis=1)
+        found = [(start, end) for (start, end, *_), own in zip(long, is_own.tolist(), strict=True) if not own]
         between = (self._moving_ns - sum(end - start for start, end in found)) / self._changes
         if between > _MOST_BETWEEN * 1e9:
             return ()

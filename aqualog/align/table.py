@@ -261,6 +261,10 @@ def plan_drive(
     standing = standing_by(speeds.values())
     unmeasured = {name: cleaner.unmeasured() for name, cleaner in cleaners.items()}
     unmeasured |= {name: Unmeasured((dead,)) for name, dead in dead_speeds(speeds).items()}
+    watches = {name: c.repeats for name, c in cleaners.items() if c.repeats is not None}
+    # measured wheels have noise, and so has what accelerates the car
+    if "a_x" in watches and (whole := watches["a_x"].whole) and any(watches[name].is_noisy for name in speeds):
+        unmeasured["a_x"] = Unmeasured((whole,))
     for name, own in unmeasured.items():
         if limits := limits_of(name):
             unmeasured[name] = own._replace(frozen=while_moving(own.frozen, standing, limits[0]))

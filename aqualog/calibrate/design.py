@@ -270,7 +270,7 @@ def _dry(columns: Mapping[str, FloatArray], moving: BoolArray) -> BoolArray:
 
 def widened(bits: BoolArray, width: int) -> BoolArray:
     """Extend true samples by `width` samples on both sides."""
-    near: BoolArray = np.convolve(bits, np.ones(2 * width + 1), mode="same") > 0.5
+    near: BoolArray = np.convolve(bits, np.ones(2 * width + 1))[width : width + bits.size] > 0.5
     return near
 
 

@@ -49,7 +49,7 @@ class Pool(NamedTuple):
     step: NDArray[np.int64]
     columns: dict[str, FloatArray]
 
-    def part(self, which: NDArray[np.int64] | slice) -> Pool:
+    def part(self, which: NDArray[np.int64] | BoolArray | slice) -> Pool:
         """Some of the samples."""
         return Pool(self.run[which], self.step[which], {k: x[which] for k, x in self.columns.items()})
 
@@ -120,13 +120,9 @@ def plan(data: CampaignData, by: Sequence[str], *, width_kmh: float = 10.0, road
     return check_plan(data.configured.campaign, by, width_kmh=width_kmh, road=road)
 
 
-def _value(run: Run, key: str) -> float | str | None:
-    return run.vehicle.stem if key == "vehicle" else run.values.get(key)
-
-
-def group_of(info: RunInfo, keys: Sequence[str]) -> Group:
+def group_of(run: Run, keys: Sequence[str]) -> Group:
     """A run's values of the keys."""
-    return tuple((k, _value(info.run, k)) for k in keys)
+    return tuple((k, run.vehicle.stem if k == "vehicle" else run.values.get(k)) for k in keys)
 
 
 def driven_of(info: RunInfo) -> tuple[str, ...]:
@@ -202,7 +198,7 @@ def cells(
                 step = index + number * _APART
                 place = next(s for s, ws in SIDES.items() if wheel in ws) if plan.by_side and wheel else wheel
                 part = (info, info.index, step, {k: x[index] for k, x in found.columns.items()})
-                parts.setdefault((group_of(info, keys), place), []).append(part)
+                parts.setdefault((group_of(info.run, keys), place), []).append(part)
     out = []
     for (group, place), pieces in sorted(parts.items(), key=lambda item: _order(item[0])):
         pool = pooled([(i, step, c) for _, i, step, c in pieces])

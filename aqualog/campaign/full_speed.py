@@ -110,7 +110,7 @@ def full_speeds(data: CampaignData, plan: Plan, table: SlopeTable) -> tuple[Full
     ]
     by_group: dict[Group, list[Pass]] = {}
     for p in passes(data):
-        by_group.setdefault(group_of(p.info, plan.keys), []).append(p)
+        by_group.setdefault(group_of(p.info.run, plan.keys), []).append(p)
     for group, members in by_group.items():
         found += [_from_passes(group, members, way, rng) for way in ("minor_spin_down", "spin_down")]
         found.append(_foretold(group, members))

@@ -45,17 +45,13 @@ class _Rule:
     told: str
 
 
-def _number(text: str) -> float:
-    return float(re.sub("[,p_]", ".", text))
-
-
 def _scaled(
     columns: tuple[str, ...], factor: float, low: float, high: float
 ) -> Callable[[re.Match[str]], dict[str, str] | None]:
     """The first group times a factor into all columns, if it is within the bounds."""
 
     def values(match: re.Match[str]) -> dict[str, str] | None:
-        value = round(_number(match[1]) * factor, 3)
+        value = round(float(re.sub("[,p_]", ".", match[1])) * factor, 3)
         return dict.fromkeys(columns, f"{value:g}") if low <= value <= high else None
 
     return values

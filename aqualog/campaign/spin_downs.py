@@ -103,7 +103,7 @@ def minor_spin_downs(data: CampaignData, plan: Plan) -> tuple[SpinDownRow, ...]:
     for p in passes(data):
         number = int(p.v_mean / KMH // plan.width_kmh)
         for wheel in p.minor:
-            members.setdefault((group_of(p.info, plan.keys), wheel, number), []).append(p)
+            members.setdefault((group_of(p.info.run, plan.keys), wheel, number), []).append(p)
 
     def order(key: tuple[Group, str, int]) -> tuple[tuple[str, ...], str, int]:
         group, wheel, number = key

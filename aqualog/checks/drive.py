@@ -1,4 +1,4 @@
-"""Torques: do they drive the axles of the vehicle file, and do they explain the acceleration."""
+"""Torques and brakes: do they drive the axles of the vehicle file, do they explain the acceleration."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ __all__ = ["drive_doubts"]
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
 GAIN_OFF = 0.10  # of the torque gain, or of the mass: more than fuel, load and a driveline's losses
 MOVING = 5.0  # [m/s]
+BRAKED = 3e5  # [Pa] from which the detectors take a wheel for braked
+ROLLING = -0.3  # [m/s^2] a car that slows down less is not braked
 PUSHED = 0.2  # [m/s^2] by the torque: driving, and surely no braking that the torque does not hold
 BLOCK = 20  # windows, 10 s: grade and wind last as long
 LEAST_BLOCKS = 10
@@ -29,11 +31,26 @@ SPREAD = 0.2  # [m/s^2] standard deviation of what the torque gives: less shows 
 
 def drive_doubts(windows: Windows) -> Iterator[Doubt]:
     """Yield what is wrong with the torques or with the vehicle file."""
+    yield from _brakes(windows)
     gains = list(_gain(windows))
     yield from gains or _resistance(windows)
     wrong = list(_drivetrain(windows))
     yield from wrong
     yield from slip_doubts(windows, _driven_by_torque(windows), is_doubted=bool(wrong))
+
+
+def _brakes(windows: Windows) -> Iterator[Doubt]:
+    if "brake_pressure" not in windows or windows.speed.size < BLOCK:
+        return
+    with np.errstate(invalid="ignore"):
+        is_rolling = (windows.speed > MOVING) & (np.gradient(windows.speed, windows.step_s) > ROLLING)
+    pressure = windows["brake_pressure"][is_rolling]
+    pressure = pressure[np.isfinite(pressure)]
+    if pressure.size < BLOCK or (middle := float(np.median(pressure))) <= BRAKED:
+        return
+    what = f"brake_pressure is {1e-5 * middle:.1f} bar or more for half of the time in which the car does not slow down"
+    advice = "check its channel, unit and offset: what a braked wheel does is no aquaplaning"
+    yield Doubt("channel", ("brake_pressure",), what, advice, value=middle)
 
 
 def _resistance(windows: Windows) -> Iterator[Doubt]:

@@ -101,7 +101,10 @@ def offsets(windows: Windows) -> list[Offset]:
 
 def offset_doubts(windows: Windows) -> Iterator[Doubt]:
     """Yield the offsets that count, and means that are no offset: of the kind `channel`."""
-    for o in offsets(windows):
+    found = offsets(windows)
+    if not any((o.counts or o.is_absurd) and o.symbol != "a_x" for o in found):
+        yield from _apart(windows)
+    for o in found:
         kind = OFFSETS[o.symbol]
         if o.is_absurd:
             what = f"{o.symbol} shows {o.value:+.{kind.digits}f} {kind.unit} at standstill; no sensor is so far off"
@@ -117,6 +120,20 @@ def offset_doubts(windows: Windows) -> Iterator[Doubt]:
         )
         change = Change(offset=round(o.value, kind.digits))
         yield Doubt("offset", (o.symbol,), what, ways=({o.symbol: change},), value=o.value, ci95=o.ci95)
+
+
+def _apart(windows: Windows) -> Iterator[Doubt]:
+    """Yield `a_y` and `yaw_rate` that lie further apart than a car can slide sideways, without a stop too."""
+    if not windows.speed.size or "a_y" not in windows or "yaw_rate" not in windows:
+        return
+    with np.errstate(invalid="ignore"):
+        apart = (windows["a_y"] - windows.speed * windows["yaw_rate"])[windows.speed > MOVED]
+    apart = apart[np.isfinite(apart)]
+    value = float(np.median(apart)) if apart.size * windows.step_s >= LEAST_MOVED_S else 0.0
+    if abs(value) > MOST_ACCELERATION:
+        what = f"a_y lies {value:+.1f} m/s² from yaw_rate times v in the middle of the drive; no car slides like that"
+        advice = "check channel, unit, sign and offset of both in the signal map, unless all of it was on a steep bank"
+        yield Doubt("channel", ("a_y", "yaw_rate"), what, advice, value=value)
 
 
 def _mean(x: FloatArray) -> float:

@@ -15,7 +15,7 @@ __all__ = ["EXTRA", "Gather", "Windows"]
 
 WINDOW = 0.5  # [s] over which changes are compared: longer than latencies, shorter than manoeuvres
 EXTRA = "delta_a_x"  # what `detect` adds: the measure of the resistance, where it is judged
-_AS_THEY_ARE = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "latitude", "longitude")
+_AS_THEY_ARE = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "brake_pressure", "latitude", "longitude")
 
 
 @dataclass(frozen=True, slots=True)

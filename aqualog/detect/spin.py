@@ -197,11 +197,12 @@ def has_lost_traction(f: Features, wheel: str) -> BoolArray:
 def spins_round(f: Features, *, beyond: float = SIDEWAYS) -> BoolArray:
     """Where the car drifts (n,): a_y - v_x yaw_rate, the rate of its lateral velocity, is large. [m/s²]
 
-    Beyond `G` no tyre turns the car: it rotates, and its wheels roll as they lie across the road.
+    Beyond `G` no tyre turns the car: it rotates, and its wheels roll as they lie across the road. A yaw rate of exactly
+    zero was never measured.
     """
     drift = f["a_y_slow"] - f["v_x_hat"] * f["yaw_rate_slow"]
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(drift) > beyond)
+        return np.asarray((np.abs(drift) > beyond) & (f["yaw_rate_slow"] != 0.0))
 
 
 def wheel_evidence(scene: Scene, wheel: str, mu: FloatArray | None) -> dict[str, Any]:

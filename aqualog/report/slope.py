@@ -14,7 +14,7 @@ from aqualog.detect.slip_slope.regression import Line
 from aqualog.detect.slip_slope.stability import percent
 from aqualog.report.inputs import input_sections, without_remarks
 from aqualog.report.sections import Cell, Figures, Lines, Para, Report, Section, Table
-from aqualog.report.slope_figures import slope_plots
+from aqualog.report.slope_figures import place_name, slope_plots
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.values import fields_of, number, plain
 
@@ -74,11 +74,11 @@ def slope_report(result: DirectResult, notes: Sequence[str] = (), checks: Sequen
         ]
         estimated = Table(_RECURSIVE, rows, "slopes")
     parts = [
-        (_name(p), f"{s.start_s / 60.0:.1f}", f"{s.end_s / 60.0:.1f}", f"{s.seconds:.1f}",
+        (place_name(p), f"{s.start_s / 60.0:.1f}", f"{s.end_s / 60.0:.1f}", f"{s.seconds:.1f}",
          f"{s.line.slope:.1f}" if s.line.told else "–", _interval(s.line.slope_ci) if s.line.told else s.line.reason)
         for p in places for s in p.segments
     ]  # fmt: skip
-    stability = [(_name(p), f"{p.stability.sentence}{_per_hour(p)}") for p in places]
+    stability = [(place_name(p), f"{p.stability.sentence}{_per_hour(p)}") for p in places]
     sections = [
         *input_sections(checks),
         Section("Slip slope C_s/F_z", [Para(head, where="text"), estimated], "slopes-section"),
@@ -115,7 +115,7 @@ def slope_lines(result: DirectResult) -> list[str]:
 def _row(p: PlaceSlope) -> tuple[str | Cell, ...]:
     line, end = p.line, p.recursion
     return (
-        Cell(_name(p), WHEEL_COLOURS.get(p.wheel or "", "ink")),
+        Cell(place_name(p), WHEEL_COLOURS.get(p.wheel or "", "ink")),
         number(line.slope, 1),
         _interval(line.slope_ci) if line.told else "–",
         number(100.0 * line.offset, 2) if line.told else "–",
@@ -126,10 +126,6 @@ def _row(p: PlaceSlope) -> tuple[str | Cell, ...]:
         f"{number(100.0 * line.attenuation, 1)}{' (corrected)' if line.is_corrected else ''}",
         f"{number(end.slope, 1)} ± {number(end.slope_sd, 1)}" if math.isfinite(end.slope) else "–",
     )
-
-
-def _name(p: PlaceSlope) -> str:
-    return p.place.upper() if p.wheel else p.place
 
 
 def _below(p: PlaceSlope) -> str:

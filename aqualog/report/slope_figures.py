@@ -12,7 +12,7 @@ from aqualog.report.figures import axis, band, bars, dots, error_bars, figure, l
 from aqualog.report.reduce import reduce_indices
 from aqualog.report.theme import INK, MUTED, wheel_colour
 
-__all__ = ["slope_plots"]
+__all__ = ["place_name", "slope_plots"]
 
 _MOST_DOTS = 4000  # per place; more are thinned evenly in time
 _CLASSES = 14
@@ -43,7 +43,8 @@ def slope_plots(result: DirectResult) -> dict[str, Any]:
     return {**plots, "share": _time_share(result)} if result.places else plots
 
 
-def _name(p: PlaceSlope | Recursion) -> str:
+def place_name(p: PlaceSlope | Recursion) -> str:
+    """Return the name of a wheel or a side as pages show it."""
     return p.place.upper() if p.wheel else p.place
 
 
@@ -55,7 +56,7 @@ def _scatter(p: PlaceSlope) -> dict[str, Any]:
     # the more dots, the lighter each: where they lie on top of each other it gets dark
     opacity = float(np.clip(120.0 / max(mu.size, 1), 0.08, 0.6))
     data = [dots("samples", mu, slip, colour, style={"opacity": opacity}), _classes(p)]
-    title = _name(p) if p.wheel and p.line.told else p.place
+    title = place_name(p) if p.wheel and p.line.told else p.place
     if p.line.told:
         data += _line_with_band(p, colour)
         title += f": slope {p.line.slope:.1f}"
@@ -97,7 +98,7 @@ def _parts(p: PlaceSlope) -> dict[str, Any]:
     words = [[f"{a:.1f} ... {b:.1f}", f"{s.seconds:.0f} s used"] for a, b, s in zip(low, high, told, strict=True)]
     colour = wheel_colour(p.wheel)
     return line(
-        _name(p), [(s.start_s + s.end_s) / 120.0 for s in told], slope, colour, style={"dash": "dot"},
+        place_name(p), [(s.start_s + s.end_s) / 120.0 for s in told], slope, colour, style={"dash": "dot"},
         mode="lines+markers", marker={"color": colour, "size": 8}, error_y=error_bars(slope, low, high, colour),
         customdata=words,
         hovertemplate="%{y:.1f} (95 %: %{customdata[0]}), %{customdata[1]}<extra>%{fullData.name}</extra>",
@@ -109,7 +110,9 @@ def _course(r: Recursion) -> dict[str, Any]:
     # it holds its value between the stretches that are used: a line through them, not a dot here and there
     keep = np.flatnonzero(np.isfinite(r.slopes))
     keep = keep[reduce_indices(r.slopes[keep], _POINTS)]
-    return line(_name(r), r.t[keep] / 60.0, r.slopes[keep], wheel_colour(r.wheel), width=1.3, style={"shape": "hv"})
+    return line(
+        place_name(r), r.t[keep] / 60.0, r.slopes[keep], wheel_colour(r.wheel), width=1.3, style={"shape": "hv"}
+    )
 
 
 def _time_share(result: DirectResult) -> dict[str, Any]:
@@ -119,7 +122,7 @@ def _time_share(result: DirectResult) -> dict[str, Any]:
         (reason, colour, [p.left_out[reason] for p in result.places])
         for reason, colour in zip(LEFT_OUT, _COLOURS, strict=True)
     ]
-    names = [_name(p) for p in result.places]
+    names = [place_name(p) for p in result.places]
     data = [
         bars(name, names, seconds, colour, hovertemplate="%{x:.0f} s<extra>" + name + "</extra>")
         for name, colour, seconds in parts

@@ -244,7 +244,7 @@ def judge(
         reason = _ONLY_PART
     return Check(
         claim, c.text.format(**words), found, verdict, c.part.format(**words), c.statement,
-        None if value is None or math.isinf(value) else value, ci95, c.unit if unit is None else unit, reason,
+        value if value is not None and math.isfinite(value) else None, ci95, c.unit if unit is None else unit, reason,
         c.source.format(**words),
     )  # fmt: skip
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from aqualog.campaign.bins import Group
-from aqualog.campaign.definition import Campaign, Run
+from aqualog.campaign.bins import Group, group_of
+from aqualog.campaign.definition import Campaign
 from aqualog.core.errors import ConfigError
 from aqualog.core.intervals import student_quantile
 from aqualog.trade.braking import Stop
@@ -130,7 +130,7 @@ def entries_of(
     for order, (i, number, record, m) in enumerate(found):
         run, onset = campaign.runs[i], m.onset[number - 1] if m.onset else None
         tyre = str(run.values.get("tyre", ""))
-        entries.append(Entry(names[i], number, float(order), _group(run, keys), tyre, record, onset))
+        entries.append(Entry(names[i], number, float(order), group_of(run, keys), tyre, record, onset))
     return tuple(entries)
 
 
@@ -165,10 +165,6 @@ def evaluated(entries: Sequence[Entry], options: Options, failed: Mapping[str, s
         for g, m in groups.items()
     ]
     return _indexed(test, rows, lambda blocks: _scalar_blocks(judged, blocks, options))
-
-
-def _group(run: Run, keys: Sequence[str]) -> Group:
-    return tuple((k, run.vehicle.stem if k == "vehicle" else run.values.get(k)) for k in keys)
 
 
 def _is_control(entries: Sequence[Entry], members: Sequence[int], options: Options) -> bool:

@@ -170,7 +170,9 @@ class Watching:
             result = do(
                 measure_log, run, given.vehicles[run.vehicle], given.signal_map, given.dbc, self._request
             )  # fmt: skip
-            found.append(CRASHED if isinstance(result, Crashed) else _known(result))
+            found.append(
+                CRASHED if isinstance(result, Crashed) else result if isinstance(result, Measured) else str(result)
+            )
         now = {Path(name): State(size, mtime) for name, size, mtime in state_of(drive.paths)}
         if any(now.get(p) != self._digests[p][0] for p in drive.paths):
             return False
@@ -209,7 +211,3 @@ class Watching:
             tuple(r for i, r in enumerate(campaign.runs) if i not in came),
             tuple(self._name(d.paths[0]) for d in drives if not d.runs),
         )  # fmt: skip
-
-
-def _known(result: object) -> Measured | str:
-    return result if isinstance(result, Measured) else str(result)

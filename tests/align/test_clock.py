@@ -300,17 +300,13 @@ def test_speed():
     assert time.perf_counter() - began < 3.0
 
 
-def nanoseconds(seconds):
-    return np.rint(seconds.to_numpy() * 1e9).astype(np.int64)
-
-
 def toyota(name):
     table = pl.read_csv(REAL / "toyota_rav4" / name)
     if name == "gnss.csv":
         values = table["speed [m/s]"].to_numpy()
     else:
         values = table.drop("t [s]").to_numpy().mean(axis=1)
-    return nanoseconds(table["t [s]"]), values
+    return np.rint(table["t [s]"].to_numpy() * 1e9).astype(np.int64), values
 
 
 def porsche(name, *columns):

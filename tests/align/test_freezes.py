@@ -104,6 +104,19 @@ def test_a_sensor_of_the_body_that_stands_still_is_dead_at_zero_too(name, value)
     assert found(t, np.round(x, 0), name) == ()  # too coarse to be judged
 
 
+@pytest.mark.parametrize("pieces", [1, 7, 1000])
+@pytest.mark.parametrize(("name", "step"), [("v_x", 0.1 / 3.6), ("a_y", 0.05), ("yaw_rate", 0.004)])
+def test_a_coarse_signal_stands_by_itself_in_even_driving(name, step, pieces):
+    """At constant speed on a straight road or a test bench its noise is smaller than its step, elsewhere it is not."""
+    t = moving(seconds=180.0)[0]
+    uneven = np.interp(t / S, [0, 50, 70, 110, 130, 180], [1, 1, 0, 0, 1, 1])
+    noise = (0.05 + uneven) * step * np.random.default_rng(2).standard_normal(t.size)
+    x = np.round((20.0 * (name == "v_x") + noise) / step) * step
+    assert found(t, x, name, pieces) == ()
+    x[1000:3001] = x[9000] + 30.0 * step  # now it is dead: it comes and goes by more
+    assert found(t, x, name, pieces) == ((t[1000], t[3000]),)
+
+
 def test_a_single_sample_and_none():
     watch = FreezeWatch(3.0, 2.0, 0.03)
     assert watch.finish() == ()
@@ -203,12 +216,12 @@ def test_no_detector_alarms_on_spikes_of_the_accelerometer(height, samples, soun
 
 
 def stop_and_go(name, is_standing, steady="torque_r"):
-    """Two minutes at a light at which a signal stays the same; or that signal alone stays."""
+    """Two minutes at a light at which a signal stays the same; or that signal alone stays. Slow wheels show nothing."""
     rng = np.random.default_rng(7)
     t = np.arange(40_000) * 0.01
     v = 20.0 * (np.interp(t, [0, 90, 100, 220, 230, 400], [1, 1, 0, 0, 1, 1]) if is_standing else np.ones(t.size))
     t_ns = np.round(t * S).astype(np.int64)
-    noisy = np.where(v > 0.0, v + 0.02 * rng.standard_normal(t.size), 0.0)
+    noisy = np.where(v > 1.8, v + 0.02 * rng.standard_normal(t.size), 0.0)
     torque = np.where((t > 101) & (t < 219), 14.5, np.round(100.0 + 30.0 * rng.standard_normal(t.size), 1))
     return {
         name: (t_ns, noisy / (1.0 if name == "v_x" else 0.3)),
@@ -268,3 +281,12 @@ def test_a_speed_that_never_changes_was_not_measured(value, sway, until, is_dead
     whole = in_both_ways(signals)
     assert ("omega_rl" not in whole.symbols) is is_dead
     assert any("omega_rl" in n and "is frozen there" in n for n in whole.quality.notes) is is_dead
+
+
+@pytest.mark.parametrize("is_calculated", [True, False])
+@pytest.mark.parametrize("value", [0.0, -1.2])
+def test_an_acceleration_that_never_changes_was_not_measured(value, is_calculated):
+    """Unless nothing in the log has noise."""
+    t, v = moving(noise=0.02 * (not is_calculated))
+    whole = in_both_ways({"v_x": (t, v), "omega_fl": (t, v / 0.3), "a_x": (t, np.full(t.size, value))})
+    assert ("a_x" in whole.symbols) is is_calculated

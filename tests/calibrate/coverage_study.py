@@ -18,10 +18,6 @@ CASES = {
 }
 
 
-def without_altitude(signals):
-    return replace(signals, frame=signals.frame.drop("altitude"))
-
-
 def one(seed, drives, seconds):
     """Rows (case, parameter, error over half width, half width over value, identified)."""
     signals, true, gain = campaign(seed, drives, seconds=seconds)
@@ -30,7 +26,7 @@ def one(seed, drives, seconds):
         replace(s, frame=s.frame.select(c for c in s.frame.columns if not c.startswith(("tie_rod", "steering_torque"))))
         for s in signals
     ]
-    plain = [without_altitude(s) for s in signals]
+    plain = [replace(s, frame=s.frame.drop("altitude")) for s in signals]
     known = truth(true, gain, signals[0])
     rows = []
     for name, (n, altitude, weighed) in CASES.items():

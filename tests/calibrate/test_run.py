@@ -144,6 +144,7 @@ def test_braked_and_wet_driving_is_left_out(ideal):
     assert prepare(wet, believed(true), "x").windows.v.size == 0
     with pytest.raises(FitError, match="wet"):
         calibrate([wet], ["x"], believed(true))
+    assert prepare(replace(signals, frame=signals.frame.head(20)), believed(true), "x").windows.v.size == 0
 
 
 def test_missing_signals_are_named():

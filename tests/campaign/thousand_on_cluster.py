@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 from tests.campaign.dask_here import cluster, with_children
+from tests.campaign.poisoned import files_of
 from tests.campaign.thousand import BROKEN, make
 
 
@@ -23,12 +24,6 @@ def start(campaign: Path, store: Path, *more: str) -> subprocess.Popen:
 
 def made(store: Path) -> int:
     return sum(1 for _ in (store / "samples").glob("*.parquet")) if (store / "samples").is_dir() else 0
-
-
-def files_of(store: Path) -> dict[str, bytes]:
-    return {
-        p.relative_to(store).as_posix(): p.read_bytes() for p in store.rglob("*") if p.is_file() and p.name != "lock"
-    }
 
 
 def main() -> None:

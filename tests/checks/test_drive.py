@@ -7,6 +7,7 @@ import pytest
 
 from aqualog.checks.look import look
 from tests.checks.made import CAR, made, signals
+from tests.checks.test_signs import lines_for
 
 DRIVE = made(seconds=900.0, accelerating=0.8)
 TORQUES = ("torque_rl", "torque_rr")
@@ -56,10 +57,6 @@ def exchange(*pairs):
 
 def exchanged(columns, car=KNOWN, drop=()):
     return [r for r in look(signals(columns, drop=drop), car) if r.kind in ("exchange", "drivetrain")]
-
-
-def lines_for(*pairs):
-    return {f'{a} = {{ channel = "{b}" }}' for pair in pairs for a, b in (pair, pair[::-1])}
 
 
 def test_the_axle_that_slips_is_the_driven_one():
@@ -134,3 +131,11 @@ def test_beyond_the_limits_of_the_vehicle_file_the_map_is_in_doubt():
     assert remark.advice.endswith(" times too large")
     assert "torque_gain =" not in remark.sentence
     assert "mass =" not in remark.sentence
+
+
+@pytest.mark.parametrize(("offset", "is_named"), [(0.0, False), (2.5e5, False), (3.5e5, True), (50e5, True)])
+def test_a_brake_that_acts_on_a_car_that_does_not_slow_down(offset, is_named):
+    columns = made(seconds=30.0)
+    braking = np.gradient(columns["v_x"], 0.05) < -0.5
+    remarks = look(signals({**columns, "brake_pressure": offset + 30e5 * braking}), CAR)
+    assert [r.signals for r in remarks if "bar" in r.what] == [("brake_pressure",)] * is_named

@@ -43,6 +43,12 @@ def test_without_standstill_there_is_no_offset():
     assert found(made(a_x_offset=-1.5)) == {}
 
 
+@pytest.mark.parametrize(("name", "offset"), [("a_y", 9.81), ("a_y", -4.0), ("yaw_rate", 0.5), ("a_y", 2.0)])
+def test_a_lateral_sensor_that_is_far_off_shows_without_a_stop(name, offset):
+    remarks = look(signals(made(**{f"{name}_offset": offset})), CAR)
+    assert [(r.kind, r.signals) for r in remarks] == [("channel", ("a_y", "yaw_rate"))] * (offset != 2.0)
+
+
 def test_a_car_that_never_moves_shows_no_stop():
     columns = {n: 0.0 * x + 0.6 for n, x in made().items()}
     assert found({**columns, **{n: 0.0 * x for n, x in columns.items() if n.startswith("omega_")}}) == {}

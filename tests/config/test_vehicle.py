@@ -6,6 +6,7 @@ from aqualog.config.vehicle import load_vehicle
 from aqualog.core.errors import ConfigError
 from aqualog.core.provenance import TYPICAL, provenance_of, uncertainty
 from aqualog.core.vehicle import KEYS, SOURCES, Known, Provenance, Vehicle, vehicle_toml
+from tests.config.test_signal_map import write
 
 CONTRACT = """
 name = "sedan RWD"
@@ -36,12 +37,6 @@ c0 = 0.0
 c_y = [0.11, 1e-6]
 c_x = 0.06
 """
-
-
-def write(tmp_path, text, name="x.toml"):
-    path = tmp_path / name
-    path.write_text(text, encoding="utf-8")
-    return path
 
 
 def test_vehicle_of_the_contract(tmp_path):

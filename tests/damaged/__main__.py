@@ -5,19 +5,18 @@ is misread. Two files of verdicts show whether two versions judge every log alik
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import os
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterable
 from pathlib import Path
 
 from aqualog.guard.worker import Crashed, Limits, work_on
 from tests.damaged.damage import DAMAGES, bombs
 from tests.damaged.judge import LEGEND, OUTCOMES, Seen, attempt, outcome, samples_of, verdict
 from tests.damaged.logs import FORMATS, folder_of
+from tests.record.values import digest
 
 LIMITS = Limits(seconds=30.0, memory_mb=2000)
 
@@ -43,7 +42,7 @@ def main() -> int:
                 found[path] = verdict(name, damage, sound[name], seen)
             else:
                 found[path] = f"! over limit after {seen.seconds:.0f} s" if isinstance(seen, Crashed) else seen
-            lines[path] = {"log": _digest([path.read_bytes()]), "verdict": found[path], **_facts(seen)}
+            lines[path] = {"log": digest([path.read_bytes()]), "verdict": found[path], **_facts(seen)}
             if found[path].startswith("!"):
                 print(
                     f"{name}: {damage.fault} {damage.number}: {found[path]}  {getattr(seen, 'words', '')[:300]}",
@@ -62,17 +61,10 @@ def _facts(seen: Seen | str | Crashed) -> dict[str, object]:
     """What was seen of a log, its samples as a digest."""
     if not isinstance(seen, Seen):
         return {}
-    samples = _digest(
+    samples = digest(
         part for name, (t, x) in sorted(seen.samples.items()) for part in (name.encode(), t.tobytes(), x.tobytes())
     )
     return {"code": seen.code, "told": seen.told, "lost": seen.lost, "samples": samples, "words": seen.words}
-
-
-def _digest(parts: Iterable[bytes]) -> str:
-    total = hashlib.sha256()
-    for part in parts:
-        total.update(len(part).to_bytes(8, "big") + part)
-    return total.hexdigest()[:16]
 
 
 def _made(folder, names):  # type: ignore[no-untyped-def]

@@ -122,6 +122,7 @@ def test_shares_are_the_same_however_a_drive_is_cut(cuts):
 
 
 def test_without_torque_a_spin_up_counts_in_a_drifting_car_too():
-    f = {"a_y_slow": np.full(3, 9.0), "v_x_hat": np.full(3, 20.0), "yaw_rate_slow": np.zeros(3)}
+    f = {"a_y_slow": np.full(3, 9.0), "v_x_hat": np.full(3, 20.0), "yaw_rate_slow": np.full(3, 0.01)}
     assert gate.has_lost_traction(f, "rl").all()
     assert not gate.has_lost_traction(f | {"mu_rl": np.zeros(3)}, "rl").any()
+    assert gate.has_lost_traction(f | {"mu_rl": np.zeros(3), "yaw_rate_slow": np.zeros(3)}, "rl").all()  # not logged

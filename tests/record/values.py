@@ -56,7 +56,7 @@ def values_of(path: Path) -> Any:
             return _mdf(path)
         case ".mcap":
             return _mcap(data)
-    return {"bytes": _digest([data])}
+    return {"bytes": digest([data])}
 
 
 def _csv_columns(text: str) -> dict[str, list[str]]:
@@ -70,14 +70,14 @@ def _table(columns: dict[str, list[Any]]) -> dict[str, Any]:
     rows = max(map(len, columns.values()), default=0)
     if rows * len(columns) <= SMALL:
         return json.loads(masked(json.dumps({"rows": rows, "cells": columns}, default=str)))
-    return {"rows": rows, "digests": {n: _digest(masked(repr(x)).encode() for x in c) for n, c in columns.items()}}
+    return {"rows": rows, "digests": {n: digest(masked(repr(x)).encode() for x in c) for n, c in columns.items()}}
 
 
 def _mdf(path: Path) -> dict[str, str]:
     """Digests of every channel's samples and times."""
     with MDF(path) as log:
         return {
-            f"{s.name} [{s.unit}]": _digest((s.timestamps.tobytes(), s.samples.tobytes())) for s in log.iter_channels()
+            f"{s.name} [{s.unit}]": digest((s.timestamps.tobytes(), s.samples.tobytes())) for s in log.iter_channels()
         }
 
 
@@ -86,15 +86,15 @@ def _mcap(data: bytes) -> dict[str, str]:
     topics: dict[str, list[bytes]] = {}
     for _, channel, message in make_reader(BytesIO(data)).iter_messages():
         topics.setdefault(channel.topic, []).append(str(message.log_time).encode() + message.data)
-    return {name: _digest(messages) for name, messages in sorted(topics.items())}
+    return {name: digest(messages) for name, messages in sorted(topics.items())}
 
 
 def digest_of(document: Any) -> str:
     """One digest of a document."""
-    return _digest([masked(json.dumps(document, sort_keys=True)).encode()])
+    return digest([masked(json.dumps(document, sort_keys=True)).encode()])
 
 
-def _digest(parts: Iterable[bytes]) -> str:
+def digest(parts: Iterable[bytes]) -> str:
     total = hashlib.sha256()
     for part in parts:
         total.update(len(part).to_bytes(8, "big") + part)

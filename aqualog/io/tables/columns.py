@@ -276,7 +276,7 @@ def judged_unit(stamps: NDArray[np.float64] | NDArray[np.int64]) -> tuple[str, s
         is_plausible = not step or _PLAUSIBLE_STEP_S[0] <= step / per_s <= _PLAUSIBLE_STEP_S[1]
         if _EPOCH_S[0] < middle / per_s < _EPOCH_S[1] and is_plausible:
             return name, "it counts from 1970"
-    if (np.rint(values) == values).all() and step >= 1 and float(np.ptp(values)) > _ABSURD_S:
+    if (np.abs(np.rint(values) - values) <= 1e-6 * step).all() and step >= 1 and float(np.ptp(values)) > _ABSURD_S:
         name = "ms" if step <= 1e3 else "us" if step <= 1e6 else "ns"
         return name, f"whole numbers, {step:g} apart"
     return "s", "its steps are those of seconds"

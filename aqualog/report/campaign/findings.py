@@ -130,7 +130,7 @@ def groups_of(data: CampaignData, keys: Sequence[str]) -> tuple[Group, ...]:
             return 2, 0.0, ""
         return (1, 0.0, value) if isinstance(value, str) else (0, value, "")
 
-    return tuple(sorted({group_of(info, keys) for info in data.runs}, key=lambda g: [rank(v) for _, v in g]))
+    return tuple(sorted({group_of(info.run, keys) for info in data.runs}, key=lambda g: [rank(v) for _, v in g]))
 
 
 def slope_curves(table: SlopeTable) -> tuple[Curve, ...]:

@@ -264,7 +264,7 @@ def _runs(
         "verdict": [_VERDICTS.index(r.judgement.verdict) if r.is_done else -1 for r in data.runs],
         "episodes": [len(r.judgement.of("aquaplaning")) for r in data.runs],
         "facets": [f["runs"] for f in facets],
-        "group": [index[group_of(r, keys)] for r in data.runs],
+        "group": [index[group_of(r.run, keys)] for r in data.runs],
         **{name: [row[i] for row in rows] for i, name in enumerate(("v", "s", "km", "dry", "full", "events", "gone"))},
         "unavailable": [list(g) for g in gone],
     }

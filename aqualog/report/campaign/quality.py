@@ -150,7 +150,7 @@ def _few(data: CampaignData, keys: Sequence[str]) -> Problem:
     """Configurations on water whose runs are too few for an interval."""
     groups: dict[Group, list[RunInfo]] = {}
     for r in data.done:
-        groups.setdefault(group_of(r, keys), []).append(r)
+        groups.setdefault(group_of(r.run, keys), []).append(r)
     hits = [
         (r.index, f"{group_text(g)}: {counted(len(runs), 'run')}")
         for g, runs in groups.items()

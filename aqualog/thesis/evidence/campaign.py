@@ -16,7 +16,7 @@ from aqualog.detect.stream import detect_drive
 from aqualog.thesis.catalogue import rows
 from aqualog.thesis.evidence.selection import Selected, choose
 
-__all__ = ["KMH", "DriveRun", "Evidence", "free_wheels"]
+__all__ = ["KMH", "DriveRun", "Evidence"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,11 +98,6 @@ class Facts:
     def is_constant(self) -> bool:
         """Whether the speed is kept on the water."""
         return abs(self.a) < CONSTANT
-
-
-def free_wheels(info: RunInfo) -> tuple[str, ...]:
-    """Wheels that are not driven; of an all-wheel-drive car the front ones, which meet the water first."""
-    return tuple(w for w in WHEELS if w[0] == info.vehicle.watched_axle)
 
 
 class Evidence:

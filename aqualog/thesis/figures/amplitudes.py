@@ -149,7 +149,7 @@ def _c111(times: dict[str, Times], causes: dict[float, dict[str, list[float]]]) 
         + f"; smallest axle force {least:.0f} N{whose}"
     )
     fields = {"causes": ", ".join(f"{n} {_number(left[0.07][n])} / {_number(left[0.03][n])}" for n in _CAUSES)}
-    return judge("C111.figure", outcome, verdict=verdict, value=_known(ratios["sine"][0.07]), fields=fields)
+    return judge("C111.figure", outcome, verdict=verdict, value=ratios["sine"][0.07], fields=fields)
 
 
 def _c112(times: dict[str, list[float]]) -> Check:
@@ -159,7 +159,7 @@ def _c112(times: dict[str, list[float]]) -> Check:
     # prediction error at the peak of 0.03 on the front axle, with the rear's share of the same force
     mu_delta = 0.03 * (1.0 + SUV.l_r / SUV.l_f)
     fields = {"error": 1e3 * (mu_delta * (1.0 / LOW_SLOPE - 1.0 / SUV.slope_f))}
-    return judge("C112.figure", outcome, verdict=verdict, value=_known(times["sine"][-1]), fields=fields)
+    return judge("C112.figure", outcome, verdict=verdict, value=times["sine"][-1], fields=fields)
 
 
 def _c113(times: dict[str, list[float]]) -> Check:
@@ -180,11 +180,7 @@ def _c113(times: dict[str, list[float]]) -> Check:
         + whose
     )
     fields = {"tangent": tangent, "mu": mu, "estimated": estimated}
-    return judge("C113.figure", outcome, verdict=verdict, value=_known(times["sine"][-1]), fields=fields)
-
-
-def _known(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+    return judge("C113.figure", outcome, verdict=verdict, value=times["sine"][-1], fields=fields)
 
 
 def _number(ratio: float) -> str:

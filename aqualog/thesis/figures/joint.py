@@ -186,10 +186,6 @@ def _median(values: list[float]) -> float:
     return float(np.median([np.inf if np.isnan(v) else v for v in values]))
 
 
-def _value(x: float) -> float | None:
-    return x if np.isfinite(x) else None
-
-
 def _c72(all_runs: tuple[SceneRun, ...]) -> Check:
     rear, minor = [], []
     for r in all_runs:
@@ -210,7 +206,7 @@ def _c73(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
     kept = [_kept(r, 2, *_ACTIVE_2) for r in all_runs]
     whole = soon >= MANY and float(np.median(kept)) >= _KEPT
     outcome = f"within {_SOON:g} s in {in_runs(soon)} runs, after {spread(two)} s; met for {spread(kept)} of that time"
-    return judge("C73.figure", outcome, whole=whole, part=_median(two) <= _SOON, value=_value(_median(two)))
+    return judge("C73.figure", outcome, whole=whole, part=_median(two) <= _SOON, value=_median(two))
 
 
 def _c74(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
@@ -227,7 +223,7 @@ def _c74(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
         f"met in {in_runs(found)} runs, after {spread(four)} s; kept in {in_runs(_share(ends))}; by the rear right "
         f"wheel in {in_runs(right)}, whose slope could be judged for {spread(judged_s)} s on the lane"
     )
-    return judge("C74.figure", outcome, whole=whole, part=found >= SOME, value=_value(_median(four)))
+    return judge("C74.figure", outcome, whole=whole, part=found >= SOME, value=_median(four))
 
 
 def _c75(times: list[Times]) -> Check:
@@ -254,7 +250,7 @@ def _c76(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
     part = in_time or order >= MANY
     drag = [float(np.nanmedian(r.feature("delta_a_x")[r.on_lane()])) for r in all_runs]  # [m/s^2]
     fields = {"drag": spread(drag), "threshold": DEFAULT.resistance}
-    return judge("C76.figure", outcome, whole=whole, part=part, value=_value(_median(five)), fields=fields)
+    return judge("C76.figure", outcome, whole=whole, part=part, value=_median(five), fields=fields)
 
 
 def _c77(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
@@ -268,7 +264,7 @@ def _c77(all_runs: tuple[SceneRun, ...], times: list[Times]) -> Check:
         f"{spread([t.cross for t in times])} s, rise after {spread([t.rise for t in times])} s), more than once "
         f"in {in_runs(again)}"
     )
-    value = _value(_median([t.cross for t in times]))
+    value = _median([t.cross for t in times])
     return judge("C77.figure", outcome, whole=whole, part=in_order >= MANY and active >= MANY, value=value)
 
 

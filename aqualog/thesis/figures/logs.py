@@ -7,11 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.campaign.bins import free_of
 from aqualog.campaign.results import RunInfo
 from aqualog.detect.joint_criteria import CRITERIA
 from aqualog.detect.slip_slope.activation import CORNERING
 from aqualog.thesis.catalogue import rows
-from aqualog.thesis.evidence.campaign import KMH, DriveRun, Evidence, free_wheels
+from aqualog.thesis.evidence.campaign import KMH, DriveRun, Evidence
 from aqualog.thesis.evidence.selection import FAMILIES, NotInCampaign, label, value_of
 from aqualog.thesis.figures.joint import panels_2_25
 from aqualog.thesis.figures.panels import FRONT, WHEEL_WORDS
@@ -50,8 +51,8 @@ def _most(count: dict[str, int], like: str = "") -> str:
 
 
 def _down_and_up(evidence: Evidence, info: RunInfo) -> tuple[Score, Shown] | None:
-    down = _count(evidence, info, "spin_down", free_wheels(info))
-    up = _count(evidence, info, "spin_up", [w for w in info.vehicle.driven if w not in free_wheels(info)])
+    down = _count(evidence, info, "spin_down", free_of(info))
+    up = _count(evidence, info, "spin_up", [w for w in info.vehicle.driven if w not in free_of(info)])
     if not down or not up:
         return None
     front = _most(down)
@@ -59,7 +60,7 @@ def _down_and_up(evidence: Evidence, info: RunInfo) -> tuple[Score, Shown] | Non
 
 
 def _minor(evidence: Evidence, info: RunInfo) -> tuple[Score, Shown] | None:
-    minor = _count(evidence, info, "minor_spin_down", free_wheels(info))
+    minor = _count(evidence, info, "minor_spin_down", free_of(info))
     if not minor or info.vehicle.drivetrain == "awd":
         return None
     wheel = _most(minor)

@@ -81,14 +81,14 @@ def figure_3_09() -> Figure:
     )
     first = "; ".join(f"{short[n]} down to {_period(_first_half(fine[n]['as tuned']))}" for n in PANELS)
     whole, part = all(map(_falls_and_rises, octaves.values())), all(b == 8.0 for b in best.values())
-    value = _finite(best["sine, minimum of differential traction"])
+    value = best["sine, minimum of differential traction"]
     c108 = judge("C108.figure", outcome, whole=whole, part=part, value=value, fields={"first": first})
     spreads = [_spread(list(b.values())) for b in fine_best.values()]
     moved = [s > 1.4 for s in spreads]
     outcome = "; ".join(
         f"{short[n]}: " + ", ".join(f"{v} {_period(p)}" for v, p in fine_best[n].items()) for n in PANELS
     )
-    optimum = judge("C108.figure_tuning", outcome, whole=all(moved), part=any(moved), value=_finite(max(spreads)))
+    optimum = judge("C108.figure_tuning", outcome, whole=all(moved), part=any(moved), value=max(spreads))
     alarms = {n: [_at_alarm(replace(c, period=p)) for p in OCTAVES] for n, c in PANELS.items()}
     c109 = _c109(short, alarms)
     panels = [
@@ -131,7 +131,7 @@ def _c109(short: dict[str, str], alarms: dict[str, list[tuple[float, float, floa
         + f"; none above {slowest:.1f} s"
     )
     less = [differ[n] < found[n] for n in alarms]
-    value, fields = _finite(max(differ.values())), {"why": _why_adaption(alarms)}
+    value, fields = max(differ.values()), {"why": _why_adaption(alarms)}
     return judge("C109.figure", outcome, whole=all(less), part=any(less), value=value, fields=fields)
 
 
@@ -142,10 +142,6 @@ def _first_half(times: list[float]) -> float:
 
 def _period(p: float) -> str:
     return "none" if np.isnan(p) else f"{p:.2g} s"
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
 
 
 def _difference(values: list[float]) -> float:
@@ -212,7 +208,7 @@ def figure_3_11() -> Figure:
     fields = {"q_k": TUNING.q_k, "known": told(known), "tuned": told(_TUNED),
               "fast": slope_after(_tuned_case(1e4, 1.0), 2.0), "slow": slope_after(_TUNED, 2.0)}  # fmt: skip
     whole, part = by_q_near > _CHANGE and by_h > _CHANGE, by_h > _CHANGE and by_q > _CHANGE
-    c114 = judge("C114.figure", outcome, whole=whole, part=part, value=_finite(by_h), fields=fields)
+    c114 = judge("C114.figure", outcome, whole=whole, part=part, value=by_h, fields=fields)
     over_q = {f"q_k x {q:g}": (_tuned_case(q, 1.0), c, "solid") for q, c in zip(Q, COLOURS, strict=True)}
     over_h = {
         f"h x {h:g}, q_k x {q:g}": (_tuned_case(q, h), c, dash)

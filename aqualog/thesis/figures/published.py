@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 
@@ -25,6 +26,7 @@ _V = np.arange(20.0, 141.0, 1.0)  # [km/h]
 _USUAL = Condition(3.0, 1.6, 1.9, 4000.0)
 _TREADS, _PRESSURES, _LOADS = (1.6, 4.0, 7.8), (1.4, 1.9, 2.2, 2.8), (3000.0, 4000.0, 5200.0)
 _DRAG_DEPTHS = (0.6, 1.3, 2.0, 8.0)
+_tread_of, _depth_of, _speed_of = attrgetter("tread"), attrgetter("depth"), attrgetter("speed")
 _TEXTURE = 0.78e-3  # [m] of the road in the formula of [gallaway1979]
 _NAMES = {
     "full_speed": "full aquaplaning", "contact": "contact", "fade": "fade of friction", "drag": "drag",
@@ -82,29 +84,9 @@ def _speeds(rows: Sequence[Compared]) -> list[Panel]:
     depth = _depth_of
     return [
         Panel("Tread: 1.9 bar, 4000 N", *axes, (*by_tread, *_marks(own, _tread_of, _TREADS, depth), *_formulas(1.9))),
-        Panel("Pressure: worn, 4000 N", *axes, (*by_p, *_marks(worn, _pressure_of, _PRESSURES, depth))),
-        Panel("Load: worn, 1.9 bar", *axes, (*by_load, *_marks(worn, _load_of, _LOADS, depth))),
+        Panel("Pressure: worn, 4000 N", *axes, (*by_p, *_marks(worn, attrgetter("pressure"), _PRESSURES, depth))),
+        Panel("Load: worn, 1.9 bar", *axes, (*by_load, *_marks(worn, attrgetter("load"), _LOADS, depth))),
     ]
-
-
-def _depth_of(at: Condition) -> float:
-    return at.depth
-
-
-def _tread_of(at: Condition) -> float:
-    return at.tread
-
-
-def _pressure_of(at: Condition) -> float:
-    return at.pressure
-
-
-def _load_of(at: Condition) -> float:
-    return at.load
-
-
-def _speed_of(at: Condition) -> float:
-    return at.speed
 
 
 def _contact(rows: Sequence[Compared]) -> Panel:

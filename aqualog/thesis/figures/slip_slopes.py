@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aqualog.campaign.bins import KMH, Plan
+from aqualog.campaign.bins import KMH, Plan, group_of
 from aqualog.campaign.results import RunInfo
 from aqualog.campaign.slip_slope import SlopeRow, SlopeTable, at_zero_slip, slip_slopes
 from aqualog.report.theme import MUTED, wheel_colour
@@ -63,7 +63,7 @@ def measured_slopes(number: str, evidence: Evidence) -> Slopes:
     keys = dict.fromkeys(k for k in ("vehicle", *keys_of(_FAMILIES)) if k in given)
     table = slip_slopes(evidence.part([runs[i] for i in sorted(runs)]), Plan(tuple(keys)))
     of = {r.index: x.name for x in selected.levels for r in x.runs}
-    groups = {_group(r, table.plan.keys): of[r.index] for r in selected.runs}
+    groups = {group_of(r.run, table.plan.keys): of[r.index] for r in selected.runs}
     found = {
         x.name: tuple(row for row in table.rows if groups.get(row.group) == x.name) for x in selected.levels
     }  # fmt: skip
@@ -73,10 +73,6 @@ def measured_slopes(number: str, evidence: Evidence) -> Slopes:
         why = next((r.reason for x in found.values() for r in x if r.reason), "no bin of speed has enough samples")
         raise NotInCampaign(f"needs {needs_of(number)}: no slope can be estimated ({why})", where=f"figure {number}")
     return slopes
-
-
-def _group(info: RunInfo, keys: Sequence[str]) -> tuple[tuple[str, float | str | None], ...]:
-    return tuple((k, info.run.vehicle.stem if k == "vehicle" else info.run.values.get(k)) for k in keys)
 
 
 def _dry(evidence: Evidence, selected: Selected) -> list[RunInfo]:

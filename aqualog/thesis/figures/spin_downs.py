@@ -7,13 +7,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from aqualog.campaign.bins import free_of
 from aqualog.campaign.spin_downs import Pass
 from aqualog.core.intervals import wilson
 from aqualog.core.records import FloatArray
 from aqualog.thesis.catalogue import figure_of, needs_of
 from aqualog.thesis.claims import Check, judge, limit
 from aqualog.thesis.evidence import measures
-from aqualog.thesis.evidence.campaign import KMH, Evidence, free_wheels
+from aqualog.thesis.evidence.campaign import KMH, Evidence
 from aqualog.thesis.evidence.selection import NotInCampaign, Selected, is_winter, label, value_of, wear_rank
 from aqualog.thesis.figures.panels import STILL, V_KMH, WHEEL_WORDS, clouds, speed_panels, spread_over
 from aqualog.thesis.record import Axis, Figure, Panel
@@ -205,7 +206,7 @@ def _deep(evidence: Evidence, selected: Selected) -> Check | None:
 def figure_2_04(number: str, evidence: Evidence) -> Figure:
     """Clouds of slips of the free wheels; C17 to C19."""
     selected = evidence.choose(number, evidence.has_water)
-    lines = clouds(evidence, selected.runs, "slip_min", free_wheels(selected.runs[0]))
+    lines = clouds(evidence, selected.runs, "slip_min", free_of(selected.runs[0]))
     if not lines:
         raise NotInCampaign(
             "needs wheel speeds and the car's speed on water: no slip in any pass", where=f"figure {number}"

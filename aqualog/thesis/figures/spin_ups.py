@@ -113,7 +113,7 @@ def irregular(evidence: Evidence, runs: Sequence[RunInfo]) -> Check | None:
     outcome = f"with a spin-up from {v[hit].min():.0f} km/h on, without one up to " + (
         f"{v[~hit].max():.0f} km/h" if not hit.all() else "no speed: all passes spin up"
     )
-    return judge("C21.figure", outcome, whole=whole, part=mixed > 0.0, value=mixed if np.isfinite(mixed) else None)
+    return judge("C21.figure", outcome, whole=whole, part=mixed > 0.0, value=mixed)
 
 
 def falling_traction(pools: dict[str, Pool]) -> Check | None:

@@ -37,10 +37,6 @@ def soft_road(car=RWD, soft=6.0, **kw):
     return straight(replace(car, given=KNOWN), slope=slope, **kw), replace(car, given=KNOWN)
 
 
-def is_on(result, name):
-    return np.any([t.active for t in result.tracks if t.detector == name], axis=0)
-
-
 @pytest.fixture(scope="module")
 def wet():
     return run_rivals(wet_drive(), CAR)
@@ -53,7 +49,7 @@ def test_alarms_on_water(wet, name):
     assert LANE[0] <= events[0].start_s <= LANE[0] + 2.0
     assert all(e.peak > e.threshold == RIVALS[name].threshold for e in events)
     t = np.arange(wet.tracks[0].active.size) / 100.0
-    assert not is_on(wet, name)[t < LANE[0]].any()
+    assert not np.any([x.active for x in wet.tracks if x.detector == name], axis=0)[t < LANE[0]].any()
 
 
 def test_deep_spin_down_is_full(wet):
@@ -200,11 +196,7 @@ def test_a_wheel_that_is_missing_has_no_statistic():
 def test_water_is_found_behind_a_gap():
     signals = with_gaps(wet_drive(), [(5.0, 6.0)], [f"omega_{w}" for w in WHEELS])
     result = run_rivals(signals, CAR, names=[*WHEEL_RIVALS, "resistance_model"])
-    assert {e.detector for e in result.events if LANE[0] <= e.start_s < LANE[1]} == set(result_names(result))
-
-
-def result_names(result):
-    return {t.detector for t in result.tracks}
+    assert {e.detector for e in result.events if LANE[0] <= e.start_s < LANE[1]} == {t.detector for t in result.tracks}
 
 
 def test_truth_and_labels_are_not_read_and_the_bits_are_the_same_every_time(wet):

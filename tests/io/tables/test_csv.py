@@ -410,11 +410,12 @@ def test_times(read, header, cells, t_ns):
     assert log.channels["v"].absolute == (t_ns[0] > 10**18)
 
 
-@pytest.mark.parametrize("step", [10, 1])
-def test_whole_numbers_over_an_absurd_time_are_milliseconds(read, step):
-    log = read("time,v\n" + "".join(f"{k * step},1\n" for k in range(30_000)))
-    assert log.t("v")[:2] == [0, step * 10**6]
-    assert log.noted("no unit", "ms")
+@pytest.mark.parametrize(("step", "by", "unit"), [(10, 1, "ms"), (1, 1, "ms"), (0.007, 1e9, "ns")])
+def test_whole_numbers_over_an_absurd_time_are_no_seconds(read, step, by, unit):
+    """Up to rounding, as of seconds that somebody multiplied."""
+    log = read("time,v\n" + "".join(f"{k * step * by},1\n" for k in range(30_000)))
+    assert log.t("v")[:2] == [0, step * by * (10**6 if unit == "ms" else 1)]
+    assert log.noted("no unit", f"as {unit} ")
 
 
 def test_a_date_that_can_be_read_two_ways(read):
