@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -134,7 +134,7 @@ def diagnose(
         next_run = next_manoeuvre(evidence, outcome.rivals, noises, model)
     return Diagnosis(
         verdict=outcome.verdict,
-        sentence=_sentence(outcome, found, options),
+        sentence=_sentence(outcome, found, options, untested),
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
         used_s=sum(d.used_s for d in ready),
@@ -204,12 +204,12 @@ def _noises(evidence: Evidence, outcome: Outcome) -> list[Noise]:
     return [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, evidence.drives, strict=True)]
 
 
-def _sentence(outcome: Outcome, found: Found, options: Options) -> str:
+def _sentence(outcome: Outcome, found: Found, options: Options, untested: Mapping[str, str]) -> str:
     reason = f" ({short_form(found.forms[0])})" if found.forms else ""
     p = found.significance.p_value
     return verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
-        seen=p if p <= options.level else None,
+        seen=p if p <= options.level else None, untested=untested,
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from string import Formatter
 
@@ -12,6 +13,7 @@ from aqualog.model.term import Effect, Term
 
 __all__ = ["cause_sentence", "listed", "name_of", "place", "quantity", "term_words", "verdict_sentence"]
 
+MANY_UNTESTED = 5  # more than those of water, which no dry road shows
 _PLACES = {
     "fl": "front left wheel", "fr": "front right wheel", "rl": "rear left wheel", "rr": "rear right wheel",
     "f": "front axle", "r": "rear axle", "left": "left side", "right": "right side",
@@ -84,17 +86,21 @@ def verdict_sentence(
     certain: frozenset[str] = frozenset(),
     seen: float | None = None,
     source: str = "log",
+    untested: Mapping[str, str] | None = None,
 ) -> str:
     """The verdict in one sentence.
 
     `certain`: effects that are certain where others cannot be distinguished; `seen`: the test's p-value where it
-    found more than noise; `source`: `log` or `campaign`.
+    found more than noise; `source`: `log` or `campaign`; `untested`: effects that nothing is known of, and why.
     """
     names = [name_of(c.effect, c.where) for c in causes]
     if verdict == "no_effect" and seen is not None:
         return f"No effect: more than noise is left (p = {seen:.2g}), but no effect large enough to be worth naming."
     if verdict == "no_effect":
-        return f"No effect: the model agrees with the measurement, at a false-alarm level of {level:g}."
+        agrees = f"No effect: the model agrees with the measurement, at a false-alarm level of {level:g}"
+        why = Counter((untested or {}).values()).most_common(1)
+        few = f"; {why[0][1]} effects were not tested ({why[0][0]})" if why and why[0][1] >= MANY_UNTESTED else ""
+        return f"{agrees}{few}."
     if verdict == "named":
         return causes[0].sentence
     if verdict == "compound":

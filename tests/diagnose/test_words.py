@@ -35,3 +35,14 @@ def test_more_than_noise_and_nothing_large_is_one_sentence():
     text = verdict_sentence("no_effect", (), level=0.01, seen=0.0022)
     assert "more than noise is left (p = 0.0022)" in text
     assert "agrees with the measurement" not in text
+
+
+@pytest.mark.parametrize(
+    ("count", "said"), [(4, "0.01."), (5, "0.01; 5 effects were not tested (no wheel torque in the log).")]
+)
+def test_no_effect_says_what_was_not_tested(count, said):
+    untested = dict.fromkeys(map(str, range(count)), "no wheel torque in the log") | {
+        "water": "no water depth in the log"
+    }
+    text = verdict_sentence("no_effect", (), level=0.01, untested=untested)
+    assert text == f"No effect: the model agrees with the measurement, at a false-alarm level of {said}"
