@@ -91,7 +91,7 @@ def verdict_sentence(
     """The verdict in one sentence.
 
     `certain`: effects that are certain where others cannot be distinguished; `seen`: the test's p-value where it
-    found more than noise; `source`: `log` or `campaign`; `untested`: effects that nothing is known of, and why.
+    found more than noise; `source`: `log` or `campaign`; `untested`: effects that the log cannot show, and why.
     """
     names = [name_of(c.effect, c.where) for c in causes]
     if verdict == "no_effect" and seen is not None:
