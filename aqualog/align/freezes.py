@@ -3,10 +3,11 @@
 A measured speed or torque never keeps its last digit for long. On five measured cars the longest such stretch of a
 moving wheel is 0.9 s, of a torque 18 s. The check judges a signal only if it shows noise elsewhere. It therefore never
 reports a coarse signal at constant speed, or one that was calculated. A standing wheel, a torque of zero, and any
-torque of a standing car may keep their value for any time. A wheel whose first value lasts until a step that no wheel
-can make was not measured before that step: control units send zeros or a code before their sensors are awake. A speed
-that keeps one value through the whole log, while another speed shows a drive, was never measured. In any other channel
-only one stop that is unlike the rest of the signal is reported.
+torque, acceleration or yaw rate of a standing car may keep their value for any time. A wheel whose first value lasts
+until a step that no wheel can make was not measured before that step: control units send zeros or a code before their
+sensors are awake. A speed that keeps one value through the whole log, while another speed shows a drive, was never
+measured; nor was such an `a_x` beside a speed with noise. In any other channel only one stop that is unlike the rest of
+the signal is reported.
 """
 
 from __future__ import annotations

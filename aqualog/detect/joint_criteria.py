@@ -25,8 +25,9 @@ from aqualog.physics.load import G
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
-    "CRITERIA", "FULL", "GATE", "GATED", "GATE_AFTER", "GATE_HOLD", "HOLD", "JOINT_CRITERIA", "MAY_BE_WATER", "SLOPE",
-    "Criteria", "JointCriteriaWatch", "criteria", "gate_params", "joint_needs", "joint_severity", "without_start",
+    "CRITERIA", "FULL", "GATE", "GATED", "GATE_AFTER", "GATE_HOLD", "HOLD", "JOINT_CRITERIA", "MAY_BE_WATER", "ROTATES",
+    "SLOPE", "Criteria", "JointCriteriaWatch", "criteria", "gate_params", "joint_needs", "joint_severity",
+    "without_start",
 ]  # fmt: skip
 
 THRESHOLD = 0.03  # [m/s]
@@ -42,6 +43,7 @@ GATED = (1, 2, 3, 4)  # one of these must be met while the gate is open; 5 needs
 _OF_WHEELS = (SPIN_DOWN.name, MINOR_SPIN_DOWN.name, SPIN_UP.name)
 # as later detectors find them
 GATE, GATE_AFTER, MAY_BE_WATER, FULL = "gate", "gate_after", "may_be_water", "criterion_full"
+ROTATES = "rotates"  # the car does, or has a moment ago
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +112,8 @@ def gate_params(dt: float, threshold: float = THRESHOLD) -> CusumParams:
 class JointCriteriaWatch:
     """Joint detector 1: criteria 1 to 4 behind the resistance gate, 5 beside them.
 
-    The gate and where water may be the cause of a lost slope (n,) are shared as `GATE` and `MAY_BE_WATER`. Features:
+    The gate, where water may be the cause of a lost slope, and where the car spins round (n,) are shared as `GATE`,
+    `MAY_BE_WATER` and `ROTATES`. Features:
     `criterion_1` ... `criterion_5`, `criterion_full`, `joint_gate`.
     """
 
@@ -160,7 +163,8 @@ class JointCriteriaWatch:
         features = {f"criterion_{k}": b.astype(np.float64) for k, b in found.met.items()}
         features["joint_gate"] = gate.astype(np.float64)
         features[FULL] = found.is_full.astype(np.float64)
-        return Output((Found(track, evidence),), features, {GATE: gate, GATE_AFTER: after, MAY_BE_WATER: slope})
+        shared = {GATE: gate, GATE_AFTER: after, MAY_BE_WATER: slope, ROTATES: rotates}
+        return Output((Found(track, evidence),), features, shared)
 
     def _may_be_water(self, scene: Scene, x: FloatArray) -> BoolArray:
         slopes = scene.of(SLIP_SLOPE_DROP)

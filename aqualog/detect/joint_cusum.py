@@ -19,6 +19,7 @@ from aqualog.detect.joint_criteria import (
     HOLD,
     JOINT_CRITERIA,
     MAY_BE_WATER,
+    ROTATES,
     joint_needs,
     joint_severity,
     without_start,
@@ -27,7 +28,6 @@ from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import MEASURE, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 from aqualog.detect.spin import SPIN_DOWN, SPIN_UP, has_lost_traction, spins_round
-from aqualog.physics.load import G
 
 __all__ = ["JOINT_CUSUM", "TERMS", "JointCusumParams", "JointCusumWatch", "terms"]
 
@@ -121,14 +121,14 @@ class JointCusumWatch:
 
 
 def _counts(track: Track, scene: Scene) -> BoolArray:
-    """Flag samples without a braking force on the statistic's wheel.
+    """Flag samples without a braking force on the statistic's wheel, in a car that does not rotate.
 
     Of a variance 0.7 must belong to one axle. A wheel that spins up must have lost its traction, as the single detector
     asks (C27), and not in a car that spins round: on a dry road the engine spins it up with all of it.
     """
     if track.wheel is None:
         return np.ones(scene.size, dtype=bool)
-    bits = ~scene.braking[track.wheel] & ~spins_round(scene.f, beyond=G)
+    bits: BoolArray = ~scene.braking[track.wheel] & ~scene.shared[ROTATES]
     if track.detector == MINOR_SPIN_DOWN.name:
         with np.errstate(invalid="ignore"):
             bits &= track.statistic > ALONE * scene.f.get(f"variance_{track.wheel}", track.statistic)

@@ -57,7 +57,7 @@ def conclude(found: Found, model: Model) -> Outcome:
     An unknown form comes before any name; beside it stand the effects of the same set whose probability is 0.95 or
     more. A name needs that probability too, and must pass the checks of `judge.repeats`. Else the answer is what the
     posterior consists of, up to 0.95. Sets whose causes worth naming are the same count together. An only answer
-    that fails a check and leaves the channels larger than it finds them is noise.
+    that is not named and leaves the channels larger than it finds them is noise.
     """
     if found.forms:
         linear = _linear(found.arena, found.posterior, found.posterior.best, model)

@@ -49,6 +49,12 @@ def test_a_lateral_sensor_that_is_far_off_shows_without_a_stop(name, offset):
     assert [(r.kind, r.signals) for r in remarks] == [("channel", ("a_y", "yaw_rate"))] * (offset != 2.0)
 
 
+def test_a_long_bend_is_no_lateral_sensor_that_is_far_off():
+    columns = made(one_way=True, turning=0.3, v=30.0)
+    assert np.median(columns["a_y"]) > 3.0
+    assert not [r for r in look(signals(columns), CAR) if r.signals == ("a_y", "yaw_rate")]
+
+
 def test_a_car_that_never_moves_shows_no_stop():
     columns = {n: 0.0 * x + 0.6 for n, x in made().items()}
     assert found({**columns, **{n: 0.0 * x for n, x in columns.items() if n.startswith("omega_")}}) == {}

@@ -11,7 +11,7 @@ from aqualog.core.records import Track
 from aqualog.detect import joint_criteria, joint_cusum, other_surface
 from aqualog.detect.detector import JointCusumParams, Scene, Settings, Setup
 from aqualog.detect.events import EventBook
-from aqualog.detect.joint_criteria import GATE, GATE_AFTER, JOINT_CRITERIA, MAY_BE_WATER
+from aqualog.detect.joint_criteria import GATE, GATE_AFTER, JOINT_CRITERIA, MAY_BE_WATER, ROTATES
 from aqualog.detect.joint_cusum import JOINT_CUSUM, TERMS
 from aqualog.detect.resistance import MEASURE
 from tests.detect import episode_study
@@ -30,6 +30,7 @@ def scene(tracks=(), x=0.3, v_x=27.0, **shared):
         GATE: ~NOTHING,
         GATE_AFTER: np.zeros(N),
         MAY_BE_WATER: ~NOTHING,
+        ROTATES: NOTHING,
     } | shared
     return Scene(features, dict.fromkeys(WHEELS, NOTHING), tracks=tuple(tracks), shared=shared)
 
@@ -212,21 +213,36 @@ def test_water_stops_a_braked_wheel_and_ice_turns_it_up_again(road, limit):
         assert not false
 
 
+def turning(joint, seen, yaw_rate, a_y=0.0):
+    """Where a joint detector warns (n,), the second one with what the first one says of the car's rotation."""
+    f = {
+        "yaw_rate_slow": yaw_rate,
+        "a_y_slow": a_y,
+        "a_kin_slow": 0.0,
+        "mu_fr": 0.2,
+    }  # a spin-up would need less to begin
+    seen = replace(seen, f=seen.f | {n: np.broadcast_to(x, (N,)) for n, x in f.items()})
+    rotates = (
+        JOINT_CRITERIA.start(Setup(JOINT_CRITERIA, CAR, DT, JOINT_CRITERIA.threshold, Settings())).push(seen).shared
+    )
+    return watched(joint, replace(seen, shared=seen.shared | {ROTATES: rotates[ROTATES]}))[0].active
+
+
 @pytest.mark.parametrize("joint", [JOINT_CRITERIA, JOINT_CUSUM])
-@pytest.mark.parametrize(("detector", "yaw_rate", "counts"), [
-    ("spin_down", 0.2, True), ("spin_down", 1.0, False), ("spin_up", 0.2, False), ("spin_up", 1.0, False),
-    ("minor_spin_down", 0.2, True), ("minor_spin_down", 1.0, False),
+@pytest.mark.parametrize(("detector", "yaw_rate", "a_y", "counts"), [
+    ("spin_down", 0.2, 0.0, True), ("spin_down", 1.0, 0.0, False), ("spin_up", 0.2, 0.0, False), ("spin_up", 1.0, 0.0, False),
+    ("minor_spin_down", 0.2, 0.0, True), ("minor_spin_down", 1.0, 0.0, False),
+    ("spin_up", 0.3, 8.1, True), ("spin_up", 0.3, -8.1, False), ("spin_down", 0.3, 8.1, True), ("spin_down", 0.3, -8.1, False),
 ])  # fmt: skip
-def test_wheels_of_a_car_that_spins_round_are_no_evidence(joint, detector, yaw_rate, counts):
-    """At 27 m/s without a force to the side: beyond 3 m/s² no spin-up counts, beyond 9.8 m/s² no wheel."""
+def test_wheels_of_a_car_that_spins_round_are_no_evidence(joint, detector, yaw_rate, a_y, counts):
+    """At 27 m/s: beyond 3 m/s² of drift no spin-up counts, beyond 9.8 m/s² no wheel; a left turn has both positive."""
     seen = scene([track("resistance", True, statistic=0.1), track(detector, True, statistic=5.0)])
-    seen.f.update(mu_fr=np.full(N, 0.2), a_kin_slow=np.zeros(N))  # a spin-up would need less traction to begin
-    assert watched(joint, seen)[0].active.any()
-    seen.f["yaw_rate_slow"] = np.full(N, yaw_rate)
-    assert watched(joint, seen)[0].active.any() == counts
+    assert turning(joint, seen, 0.0).any()
+    assert turning(joint, seen, yaw_rate, a_y).any() == counts
 
 
-def test_a_car_that_swings_from_one_side_to_the_other_still_spins():
-    seen = scene([track("spin_down", True)])
-    seen.f["yaw_rate_slow"] = np.where(np.arange(N) < 20, 1.0, 0.0)
-    assert np.flatnonzero(watched(JOINT_CRITERIA, seen)[0].active)[0] == pytest.approx(20 + 0.5 / DT, abs=1)
+@pytest.mark.parametrize("joint", [JOINT_CRITERIA, JOINT_CUSUM])
+def test_a_car_that_swings_from_one_side_to_the_other_still_spins(joint):
+    seen = scene([track("resistance", True, statistic=0.3), track("spin_down", True, statistic=5.0)])
+    active = turning(joint, seen, np.where(np.arange(N) < 20, 1.0, 0.0))
+    assert np.flatnonzero(active)[0] == pytest.approx(20 + 0.5 / DT, abs=1)

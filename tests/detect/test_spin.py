@@ -10,7 +10,7 @@ from aqualog.core.records import Track
 from aqualog.detect import spin as gate
 from aqualog.detect.detector import Scene, Setup
 from aqualog.detect.events import EventBook
-from aqualog.detect.joint_criteria import GATE, GATE_AFTER, MAY_BE_WATER
+from aqualog.detect.joint_criteria import GATE, GATE_AFTER, MAY_BE_WATER, ROTATES
 from aqualog.detect.joint_cusum import JOINT_CUSUM
 from aqualog.detect.resistance import MEASURE
 from aqualog.detect.spin import HELD_S, SPIN_DOWN, SPIN_UP, SpinParams, SpinWatch, initial_state, scan
@@ -63,7 +63,7 @@ def test_a_car_that_spins_round_has_no_spin_up(yaw_rate, begins):
     # nor does a wheel that has not begun one count in the sum
     bare = tuple(replace(x.track, active=one < 0) for x in found)
     more = {"delta_a_x": one, "criterion_full": one}
-    shared = {MEASURE: one, GATE: one > 0, GATE_AFTER: one, MAY_BE_WATER: one > 0}
+    shared = {MEASURE: one, GATE: one > 0, GATE_AFTER: one, MAY_BE_WATER: one > 0, ROTATES: one < 0}
     output = JOINT_CUSUM.start(Setup(JOINT_CUSUM, SEDAN, 0.01, 1.0)).push(
         Scene(f | more, scene.braking, {}, bare, shared)
     )

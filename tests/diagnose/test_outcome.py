@@ -168,10 +168,12 @@ def test_a_failed_check_forbids_a_name(monkeypatch):
     assert o.certain == frozenset()
 
 
-def test_what_fails_a_check_and_makes_the_channels_larger_is_noise(monkeypatch):
+def test_what_is_not_named_and_makes_the_channels_larger_is_noise(monkeypatch):
     against = S.copy()
     against[AT["payload_mass"]] = -LEFT / 300.0
     assert told(option(signatures=against, payload_mass=200.0)).verdict == "named"
+    assert told(option(SURE - 8.0, payload_mass=200.0)).verdict == "cannot_tell"
+    assert told(option(SURE - 8.0, signatures=against, payload_mass=200.0)).verdict == "no_effect"
     monkeypatch.setattr(outcome, "repeats", lambda *_: ("a value stands at its physical bound.",))
     o = told(option(signatures=against, payload_mass=200.0))
     assert (o.verdict, o.causes, o.small[-1]) == ("no_effect", (), "Not named: a value stands at its physical bound.")
@@ -210,3 +212,7 @@ def test_a_slope_of_the_tyre_is_known_as_well_as_the_form_of_its_curve():
     shown = (slip(28.0) / slip(1.4 * 28.0) - 1.0) / 0.4
     for name in ("slip_stiffness", "slip_stiffness_drift", "load_sensitivity"):
         assert EFFECTS[name].drive.doubt == pytest.approx(0.5 * (1.0 - shown), abs=0.01)
+    for key, doubt in (("slip_stiffness_r", 0.13), ("payload_mass", 0.05)):  # beside the 10 % of the fit
+        e = next(iter(told(option(**{key: 1.5 if doubt > 0.1 else 200.0})).causes[0].parameters.values()))
+        change = 0.5 if doubt > 0.1 else 200.0
+        assert (e.high - e.value) / (1.96 * change) == pytest.approx(math.hypot(0.1, doubt), rel=1e-3)

@@ -52,10 +52,7 @@ NEUTRAL = Emissions(
 
 
 def laws_of(x, z, where):
-    """Mean by covariates (nodes, _N, _Z) and covariance (nodes, _N, _N) at each node: local regression by Student's law.
-
-    `where` (n,): log of the speed of full aquaplaning over the car's.
-    """
+    """Mean by covariates and covariance at each node, where the log speed ratio (n,) is: regression by Student's law."""
     mean, scatter = np.empty((NODES.size, _N, _Z)), np.empty((NODES.size, _N, _N))
     for k, node in enumerate(NODES):
         away = where - node
@@ -72,10 +69,7 @@ def laws_of(x, z, where):
 
 
 def kinds_of(x, z, rng):
-    """Means, covariances and shares of `KINDS` kinds of windows (n, features): a mixture of Student's laws.
-
-    The means depend on covariates z (n, 1 or more), the first of which is 1.
-    """
+    """Means by covariates (the first is 1), covariances and shares of kinds of windows: a mixture of Student's laws."""
     mean = np.zeros((KINDS, _N, _Z))
     mean[:, :, 0] = x[rng.choice(len(x), KINDS, replace=False)]
     used = z.shape[1]
