@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -65,6 +66,7 @@ def make_evidence(
 ) -> Evidence:
     """Columns of all hypotheses; `present_values` (hypothesis, parameter): values in the model at hand."""
     columns: list[tuple[int, ...]] = []
+    variants = Counter((h.effect.name, h.where) for h in asked if not (h.allowed or h.effect.drive.begins_like))
     prior, low, high, smallest, tolerance, spread = [], [], [], [], [], []
     kinds: list[Kind] = []
     as_values = []
@@ -73,6 +75,8 @@ def make_evidence(
     for i, h in enumerate(asked):
         columns.append(tuple(range(k, k + len(h.free))))
         k += len(h.free)
+        # of one effect, which look much alike and together deviate by as much as one; moments do not
+        shared = 1.0 / math.sqrt(max(variants[h.effect.name, h.where], 1))
         for name in h.free:
             p = h.parameter(name)
             now = present_values[i, name]
@@ -81,10 +85,10 @@ def make_evidence(
             high.append(p.high - now)
             smallest.append(h.worth_naming(name))
             car = drives[0].vehicle
-            spread.append(math.hypot(day_to_day(h, name, car), deviation(h, name, car)))
+            spread.append(shared * math.hypot(day_to_day(h, name, car), deviation(h, name, car)))
             kinds.append(kind_of(h, name))
             as_values.append(as_value(h, name, car, speed))
-            tolerance.append(h.tolerance(name))
+            tolerance.append(shared * h.tolerance(name))
     flat = [np.concatenate(list(s)) for s in signatures]
     return Evidence(
         tuple(drives), tuple(asked), tuple(residuals), tuple(flat), tuple(columns), np.array(prior),

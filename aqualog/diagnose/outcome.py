@@ -12,6 +12,7 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.compete import Members, Posterior, fitted
+from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.judge import repeats
 from aqualog.diagnose.records import SURE, Alternative, Cause, Estimate, Verdict, tempered
@@ -19,7 +20,7 @@ from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import DOUBT, Found, Option, sharpened
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, candidates, decided, whole
-from aqualog.diagnose.words import cause_sentence
+from aqualog.diagnose.words import cause_sentence, name_of
 from aqualog.model.term import Model
 
 __all__ = ["Outcome", "conclude", "with_causes"]
@@ -82,17 +83,28 @@ def conclude(found: Found, model: Model) -> Outcome:
     d = decided(sets, lambda group: _at_place(found, group, model), failing)
     if d.verdict == "cannot_tell" and not d.alternatives and d.best and not _is_gain(found, d.best.option.refit, model):
         return Outcome("no_effect", (), small=d.notes)
+    notes = d.notes + (_beyond(found.arena, d.best.option) if d.best else ())
     return Outcome(
-        d.verdict, d.causes, d.alternatives, d.best.option.refit if d.best else None, d.notes, d.certain,
+        d.verdict, d.causes, d.alternatives, d.best.option.refit if d.best else None, notes, d.certain,
         tuple(Rival(s.option.refit, q) for s, q in d.rivals if s.option.refit is not None),
     )  # fmt: skip
 
 
+def _beyond(arena: Arena, option: Option) -> tuple[str, ...]:
+    """Sentences about effects that would stand at a physical bound beside an option."""
+    beside = [arena.evidence.asked[arena.blocks[b].tag] for b in option.beyond]
+    return tuple(
+        f"Not named: {name_of(h.effect.name, h.where)} would stand at its physical bound. Something else acts there."
+        for h in beside
+    )
+
+
 def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) -> Candidate[Option]:
     """The set at the whole car, unless another place is clearly better; with the values that a metric of few
-    tolerances gives."""
-    top = group[0].share
-    near = [s for s in group if s.option.refit is not None and s.share > top / CREDIBLE]
+    tolerances gives. One effect at two places has to be likelier with all tolerances, too: few forgive no error of the
+    simulator."""
+    top, count = group[0].share, len(group[0].causes)
+    near = [s for s in group if s.option.refit and s.share > top / CREDIBLE and len(s.causes) <= count]
     if not near:
         return group[0]
 
@@ -104,8 +116,9 @@ def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) ->
         return kept if kept.names == s.names else replace(s, sharp=loss)
 
     sharp = beside(sharper, near) if len(near) > 1 else [sharper(near[0])]
-    best = min(sharp, key=lambda s: s.sharp)
-    return max([best, *(s for s in sharp if s.sharp - best.sharp < 2.0 * math.log(PLACES))], key=whole)
+    best = min(s.sharp for s in sharp)
+    as_good = [s for s in sharp if COARSE * (s.sharp - best) < 2.0 * math.log(PLACES)]
+    return max(as_good, key=lambda s: (whole(s), s.share))
 
 
 def _refitted(found: Found, r: Refit, model: Model) -> list[tuple[Cause, bool]]:

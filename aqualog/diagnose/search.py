@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.core.errors import ConfigError
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import Arena, known_only, make_arena
@@ -22,7 +23,7 @@ from aqualog.diagnose.competition import COARSE, added, forgiving, start
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import with_elements
 from aqualog.diagnose.evidence import Evidence, make_evidence, tolerant
-from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in
+from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
 from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
@@ -52,11 +53,15 @@ Tell = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """A set of blocks of the arena and its log evidence; `refit` None where only the linear one was computed."""
+    """A set of blocks of the arena and its log evidence; `refit` None where only the linear one was computed.
+
+    `beyond`: blocks beside it that would stand at a physical bound, which its evidence needs.
+    """
 
     members: Members
     evidence: float
     refit: Refit | None = None
+    beyond: Members = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,12 +173,31 @@ def _repeated(
         if not best or best == done:
             break
         measure = metric(arena, posterior.weighings)
-        found = refit(evidence, best, _start(arena, posterior, posterior.best), measure, model)
+        led = _led(evidence, arena, posterior, model)
+        found = refit(led, best, _start(arena, posterior, posterior.best), measure, model)
         if found is None or found.at_bound:
             break
         arena, done = _around(arena, found, best, model), best
         posterior = compete(arena)
     return arena, posterior
+
+
+def _led(evidence: Evidence, arena: Arena, posterior: Posterior, model: Model) -> Evidence:
+    """The evidence whose drives meet the measured speed under the best set.
+
+    A set with an effect on the measured velocity is led by its own model. Without this, such an effect would get what a
+    load changes of the target speed.
+    """
+    columns = [c for h in _effects(arena, posterior.best) for c in evidence.columns[h]]
+    start = np.clip(_start(arena, posterior, posterior.best), evidence.low[columns], evidence.high[columns])
+    left, found = iter(start.tolist()), []
+    for h in (evidence.asked[i] for i in _effects(arena, posterior.best)):
+        found.append((h, {n: value_in(model, h, n) + next(left) for n in h.free}))
+    try:
+        best = with_values(model, found)
+        return replace(evidence, drives=tuple(led_by(d, best) for d in evidence.drives))
+    except ConfigError:
+        return evidence
 
 
 def _off(r: Refit, model: Model) -> FloatArray:
@@ -223,17 +247,21 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     chosen += [m for m, e in posterior.sets if len(m) == 1 < len(best) and e > near]
     chosen = [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m]
     measure = metric(arena, posterior.weighings, coarse=COARSE)
+    led = _led(evidence, arena, posterior, model)
     y = measure.rows([r[None] for r in evidence.residuals])
     nothing = 0.5 * float(measure.inner(y, y)[0, 0])
 
     def one(members: Members) -> Option | None:
         own = _effects(arena, members)
-        found = refit(evidence, own, _start(arena, posterior, members), measure, model)
+        found = refit(led, own, _start(arena, posterior, members), measure, model)
         if found is None or _is_nothing(found, model):
             return None
         return Option(members, _evidence(arena, found, own, measure, model, nothing), found)
 
     done = dict(zip(chosen, beside(one, chosen), strict=True))
+    within = {m: _within(o) for m, o in done.items() if o is not None}
+    smaller = [m for m in dict.fromkeys(within.values()) if m not in done]
+    done |= dict(zip(smaller, beside(one, smaller), strict=True))
     # water is not linear: without any effect, the simulator may differ from what signatures say of it
     y = measure.rows([residual(d, model)[None] for d in evidence.drives])
     bare = nothing - 0.5 * float(measure.inner(y, y)[0, 0])
@@ -242,7 +270,21 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
         # what the simulator says more or less of the best set than its signatures, it would say of the others too
         shift = out[best].evidence - linear[best]
         out |= {m: Option(m, e + shift) for m, e in linear.items() if m not in done and m}
-    return _levelled(evidence, arena, out, best, equal, model)
+    # of several effects one at its physical bound stands for what no effect is: the set counts as its other effects
+    beyond = {b for m, kept in within.items() for b in set(m) - set(kept)}
+    for m, kept in within.items():
+        if kept in out and out[kept].evidence < out[m].evidence:
+            out[kept] = replace(out[kept], evidence=out[m].evidence, beyond=tuple(b for b in m if b not in kept))
+    out = {m: o for m, o in out.items() if (within.get(m, m) == m if o.refit else not beyond & set(m))}
+    return _levelled(evidence, arena, out, within.get(best, best), equal, model)
+
+
+def _within(option: Option) -> Members:
+    """The members of a refitted set that are not at a physical bound; all of them if each of them is."""
+    if option.refit is None:
+        return option.members
+    at_bound = {i for (i, _), is_at in zip(option.refit.names, option.refit.bounded, strict=True) if is_at}
+    return tuple(m for i, m in enumerate(option.members) if i not in at_bound) or option.members
 
 
 def _levelled(

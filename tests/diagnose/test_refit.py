@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from aqualog.diagnose import search
 from aqualog.diagnose.arena import arena_of, known_only
 from aqualog.diagnose.compete import compete, fitted
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.diagnose.hypotheses import Hypothesis, with_values
+from aqualog.diagnose.hypotheses import simulated as shown
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import simulated
 from aqualog.model.effects import EFFECTS
@@ -50,6 +52,20 @@ def test_a_value_is_recovered_within_its_interval(hidden, h, true):
     assert abs(r.values[0] - true) < 3.0 * sd
     assert not r.at_bound
     assert r.model.terms[0].values[h.free[0]] == pytest.approx(r.values[0])
+
+
+def test_sets_are_refitted_where_the_simulated_car_meets_the_measured_speed_under_the_best_one():
+    load = one("payload_mass")
+    evidence, *_ = prepared([load], term("payload_mass", delta_mass=900.0))
+    arena = known_only(arena_of(evidence, ()), ())
+    led = search._led(evidence, arena, compete(arena), Model())
+    model = with_values(Model(), [(load, {"delta_mass": 900.0})])
+
+    def off(d):
+        return np.abs(shown(d, model)["v_x"] - d.speed)[d.speed > 10.0].mean()
+
+    (before,), (after,) = evidence.drives, led.drives
+    assert off(after) < 0.2 * off(before)
 
 
 def test_two_values_are_recovered_together():

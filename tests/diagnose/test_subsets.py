@@ -102,6 +102,15 @@ def test_what_is_within_tolerance_gains_little():
     assert forgiving[i] < 4.0
 
 
+def test_variants_of_one_effect_share_its_tolerance():
+    slow, begun = (EFFECTS[n] for n in ("tyre_warmup", "pressure_loss"))
+    asked = (*(Hypothesis(slow, None, ("extra",), {"time_constant": t}) for t in (150.0, 600.0)),
+             *(Hypothesis(begun, "fl", ("radius",), {"start": t}) for t in (0.0, 9.0)))  # fmt: skip
+    b = bench_of(np.zeros((2, 300)), waves(300, len(asked)), asked)
+    np.testing.assert_allclose(b.forgiven[:2], slow.drive.tolerance / np.sqrt(2.0))
+    np.testing.assert_allclose(b.forgiven[2:], begun.drive.tolerance)
+
+
 def test_a_single_effect_is_found_with_its_value():
     b = made(torque_gain=2.0)
     arena, posterior = held(b)
