@@ -55,6 +55,7 @@ def test_right_name_true_twins_and_wrong_name():
     assert got["truth in the answer"] == (6, 0.5)
     assert got["confidently wrong, z >= 8"] == (6, pytest.approx(1 / 6))
     assert got["one name given, z >= 8"] == (6, pytest.approx(2 / 6))
+    assert got["one name given, forecast isolable"] == (1, 0.0)  # the one that failed
     assert got["true value within the 95 % interval"] == (1, 1.0)
     assert got["cases that failed"] == (6, pytest.approx(1 / 6))
 

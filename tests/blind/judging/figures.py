@@ -95,7 +95,7 @@ def names(cases: Sequence[Judged]) -> list[Measure]:
     """Metric 2: the name of one strong effect; cases that failed are misses."""
     every = _singles(cases, STRONG)
     strong = [c for c in every if not c.limit_is_right]
-    isolable = [c for c in strong if c.row.error or c.row.truth[0].p_right >= SURE]
+    isolable = _isolable(strong)
     missed = [c for c in strong if not c.first_is_right]
     out = [
         share(2, "right name first, z >= 8", [c.first_is_right for c in strong], _least(0.95), ">= 0.95", least=100, note=_missed(missed)),
@@ -112,6 +112,10 @@ def names(cases: Sequence[Judged]) -> list[Measure]:
             share(2, f"  {effect}", [c.first_is_right for c in group], _least(0.95), ">= 0.95", least=10, note=note)
         )
     return out
+
+
+def _isolable(cases: Sequence[Judged]) -> list[Judged]:
+    return [c for c in cases if c.row.error or c.row.truth[0].p_right >= SURE]
 
 
 def _missed(cases: Sequence[Judged]) -> str:
@@ -290,7 +294,11 @@ def unknown(cases: Sequence[Judged]) -> list[Measure]:
 def honesty(cases: Sequence[Judged]) -> list[Measure]:
     """Who never names is never wrong: how often one name is given."""
     strong = _singles(cases, STRONG)
-    return [share(0, "one name given, z >= 8", [c.row.single for c in strong], _least(0.8), ">= 0.8", least=100)]
+    alone = _isolable(strong)
+    return [
+        share(0, "one name given, z >= 8", [c.row.single for c in strong], _anything, "-"),
+        share(0, "one name given, forecast isolable", [c.row.single for c in alone], _least(0.8), ">= 0.8", least=100),
+    ]
 
 
 def cost(cases: Sequence[Judged]) -> list[Measure]:
