@@ -11,7 +11,6 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena, products
 from aqualog.diagnose.competition import COARSE, Block, State
 from aqualog.diagnose.evidence import Evidence, forgiving
-from aqualog.diagnose.noise import Spectra, bridged, spectra
 from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, evidence_of, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
@@ -55,10 +54,10 @@ class _Noise:
 
 @dataclass(frozen=True, slots=True)
 class _Deviations:
-    """What cars and files differ by anyway along each part: transforms of few columns of independent unit values."""
+    """What cars and files differ by anyway along each part: few columns (r, C, n) of independent unit values."""
 
     arena: Arena
-    columns: tuple[Spectra, ...]
+    columns: tuple[FloatArray, ...]
 
 
 def compete(arena: Arena, *, rounds: int = ROUNDS) -> Posterior:
@@ -109,8 +108,7 @@ def _deviations(arena: Arena, white: FloatArray) -> _Deviations:
     w, V = np.linalg.eigh(root.T @ white[np.ix_(k, k)] @ root)
     values = np.zeros((int((w > NEGLIGIBLE).sum()), arena.width))
     values[:, k] = (root @ V[:, w > NEGLIGIBLE]).T
-    drawn = (spectra(bridged(arena.made(i, values).astype(np.float32), p.mask)) for i, p in enumerate(arena.parts))
-    return _Deviations(arena, tuple(drawn))
+    return _Deviations(arena, tuple(arena.made(i, values).astype(np.float32) for i in range(len(arena.parts))))
 
 
 def _after(deviations: _Deviations, noise: _Noise) -> _Noise:
@@ -132,7 +130,7 @@ def _beside(deviations: _Deviations, members: Members, fit: Fitted | None) -> _N
         values[:, fit.columns] = fit.mean + np.concatenate([z, -z])
         left = [p.residual - arena.made(i, values) for i, p in enumerate(arena.parts)]
     weighings = arena.weighed(left)
-    own, r = [], len(deviations.columns[0].values)
+    own, r = [], len(deviations.columns[0])
     at = r
     for m in members:
         b = arena.blocks[m]
@@ -141,7 +139,7 @@ def _beside(deviations: _Deviations, members: Members, fit: Fitted | None) -> _N
     gram = np.zeros((at + 1, at + 1))
     for i, (p, w) in enumerate(zip(arena.parts, weighings, strict=True)):
         drawn = w.rows(np.concatenate([*(arena.drawn(i, arena.blocks[m]) for m in members), p.residual[None]]))
-        gram += products(np.concatenate([w.again(deviations.columns[i]), drawn], dtype=np.float32))
+        gram += products(np.concatenate([w.single(deviations.columns[i]), drawn], dtype=np.float32))
     allowed = np.zeros((at, at))
     allowed[:r, :r] = np.eye(r)
     forgiven = forgiving(gram, allowed)
