@@ -24,7 +24,7 @@ _BLOCKS = (
     (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (6, 6), (7, 10), (11, 18), (19, 34), (35, 66), (67, 130),
 )  # fmt: skip
 _EDGES = np.array([0, *(b for _, b in _BLOCKS)])
-_ORDERS = (1, 2, 3, 4, 6, 8, 9, 10, 11)
+_ORDERS = np.array([1, 2, 3, 4, 6, 8, 9, 10, 11])
 MEMORY = 130
 AFTER_GAP = 6  # [samples] whose past is bridged
 HUBER = 3.0  # [sd] larger innovations weigh less
@@ -150,15 +150,20 @@ def for_mask(noise: Noise, mask: BoolArray) -> Noise:
 def _local(e: FloatArray, used: BoolArray) -> FloatArray:
     """Size of innovations (C, n) over the samples around each: rough roads and slow wheels make more noise. (C, n)"""
     usual: FloatArray = 1.4826 * np.median(np.abs(e[:, used]), axis=1, keepdims=True) + 1e-15
-    window = np.ones(2 * AROUND + 1)
-    count = np.convolve(used, window, "same") + FEW
+    count = _around(used.astype(np.float64)) + FEW
     local = np.broadcast_to(usual, e.shape)
     for _ in range(2):
         # an outlier must not make its neighbours look small, nor a rough stretch its own samples look like outliers
         square = np.where(used, np.minimum(np.abs(e), HUBER * local), 0.0) ** 2
         # samples of the whole drive besides: a stretch with few of its own has the size of all
-        local = np.sqrt((np.array([np.convolve(x, window, "same") for x in square]) + usual**2 * FEW) / count)
+        local = np.sqrt((_around(square) + usual**2 * FEW) / count)
     return np.asarray(local)
+
+
+def _around(x: FloatArray) -> FloatArray:
+    """Sums over the samples around each. (..., n)"""
+    total = np.cumsum(np.pad(x, [(0, 0)] * (x.ndim - 1) + [(AROUND + 1, AROUND)]), axis=-1)
+    return np.asarray(total[..., 2 * AROUND + 1 :] - total[..., : -2 * AROUND - 1])
 
 
 def _settled(mask: BoolArray) -> BoolArray:
@@ -172,25 +177,20 @@ def _settled(mask: BoolArray) -> BoolArray:
 
 def _autoregression(z: FloatArray, weights: FloatArray, white: float) -> FloatArray:
     """Taps (131,) of the whitening filter of one channel: weighted least squares, order by Akaike's criterion."""
-    n = z.size
-    padded = np.concatenate([np.full(MEMORY, z[:10].mean()), z])
-    total = np.concatenate([[0.0], np.cumsum(padded)])
-    at = np.arange(n) + MEMORY
-    columns = [(total[at - a + 1] - total[at - b]) / (b - a + 1) for a, b in _BLOCKS]
-    A = np.array(columns) * np.sqrt(weights)
-    y = z * np.sqrt(weights)
+    total = np.cumsum(np.concatenate([[0.0], np.full(MEMORY, z[:10].mean()), z]))
+    totals = np.array([total[MEMORY - b : MEMORY - b + z.size] for b in _EDGES.tolist()])
+    root = np.sqrt(weights)
+    A = (totals[:-1] - totals[1:]) / np.diff(_EDGES)[:, None] * root
+    y = z * root
     gram, right, power = A @ A.T, A @ y, float(y @ y)
     count = max(float(weights.sum()), 10.0)
     # as if white noise of the floor were added: of means over blocks it leaves less
     power += count * white
     gram += RIDGE * np.diag(np.diag(gram)) + np.diag([count * white / (b - a + 1) + 1e-30 for a, b in _BLOCKS])
-    best, chosen = np.inf, np.zeros(0)
-    for order in _ORDERS:
-        phi = np.linalg.solve(gram[:order, :order], right[:order])
-        rest = max(power - float(phi @ right[:order]), 1e-30)
-        criterion = count * np.log(rest) + 2.0 * order
-        if criterion < best:
-            best, chosen = criterion, phi
+    # orders are leading blocks of one factor: what each explains is a sum of squares
+    explained = np.cumsum(np.linalg.solve(np.linalg.cholesky(gram), right) ** 2)[_ORDERS - 1]
+    order = _ORDERS[np.argmin(count * np.log(np.maximum(power - explained, 1e-30)) + 2.0 * _ORDERS)]
+    chosen = np.linalg.solve(gram[:order, :order], right[:order])
     taps = np.zeros(MEMORY + 1)
     taps[0] = 1.0
     for share, (a, b) in zip(chosen.tolist(), _BLOCKS, strict=False):
