@@ -34,16 +34,17 @@ class Calibration(NamedTuple):
 
 
 def gains_of(evidence: Evidence, gram: FloatArray) -> FloatArray:
-    """Twice the log-likelihood that each hypothesis gains alone, without prior, from inner products (K + 1, K + 1).
-    (H,)"""
-    out = np.zeros(len(evidence.asked))
+    """Twice the log-likelihood that each hypothesis gains alone, without prior, from inner products of K columns and S
+    residuals. (H,) of one residual, else (H, S)"""
+    out = np.zeros((len(evidence.asked), len(gram) - evidence.count))
     for i, columns in enumerate(evidence.columns):
         c = list(columns)
         energy = np.diag(gram)[c]
         if evidence.asked[i].allowed or evidence.barred[i] or np.any(energy < 1e-12):
             continue
-        out[i] = float(gram[c, -1] @ np.linalg.solve(gram[np.ix_(c, c)], gram[c, -1]))
-    return out
+        right = gram[c, evidence.count :]
+        out[i] = (right * np.linalg.solve(gram[np.ix_(c, c)], right)).sum(axis=0)
+    return out[:, 0] if out.shape[1] == 1 else out
 
 
 def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: float, seed: int) -> Calibration:
@@ -73,13 +74,11 @@ def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: 
     values, vectors = np.linalg.eigh(inner)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     rng = np.random.default_rng(seed)
-    drawn = []
-    for _ in range(surrogates):
-        b = root @ rng.standard_normal(len(root))
-        own = np.block([[inner, b[:, None]], [b[None], np.zeros((1, 1))]])
-        drawn.append(gains_of(evidence, tolerant(evidence, own)))
+    b = root @ rng.standard_normal((surrogates, len(root))).T
+    drawn = gains_of(evidence, tolerant(evidence, np.block([[inner, b], [b.T, np.zeros((surrogates, surrogates))]])))
+    drawn = drawn.reshape(len(sizes), surrogates).T
     inflation = np.maximum(np.mean(drawn, axis=0) / sizes, 1.0)[groups]
-    maxima = (np.array(drawn) / inflation / sizes)[:, leaders].max(axis=1)
+    maxima = (drawn / inflation / sizes)[:, leaders].max(axis=1)
     # where tolerances are larger than the noise, noise alone gives almost no gain; the car's own deviations do
     threshold = max(_gumbel_quantile(maxima, level), bound)
     return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()), len(leaders))

@@ -11,13 +11,12 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena, products
 from aqualog.diagnose.competition import COARSE, Block, State
 from aqualog.diagnose.evidence import Evidence, forgiving
-from aqualog.diagnose.noise import Spectra, bridged, spectra
 from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, evidence_of, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
 from aqualog.diagnose.threads import beside
 
-__all__ = ["Fitted", "Members", "Posterior", "compete", "fitted", "rule"]
+__all__ = ["Begun", "Fitted", "Members", "Posterior", "begin", "compete", "fitted", "rule"]
 
 ROUGHLY = 2  # sets that are carried on while the noise is sought
 ROUNDS = 4  # of noise, each after what the one before has found
@@ -54,41 +53,52 @@ class _Noise:
 
 
 @dataclass(frozen=True, slots=True)
-class _Deviations:
-    """What cars and files differ by anyway along each part: transforms of few columns of independent unit values."""
+class Begun:
+    """What stays the same in all rounds: what cars and files differ by anyway along each part, as few `columns`
+    (r, C, n) of independent unit values; `whitely`, inner products in the metric of white noise; noises that were tried
+    after sets there, or in the first round.
+    """
 
     arena: Arena
-    columns: tuple[Spectra, ...]
+    columns: tuple[FloatArray, ...]
+    whitely: FloatArray
+    tried: dict[tuple[Members, bytes], _Noise]
+
+    def after(self, members: Members, fit: Fitted | None, number: int = 0) -> _Noise:
+        """The noise after a set of a round."""
+        key = (members, b"" if fit is None else fit.mean.tobytes())
+        found = self.tried.get(key) or _beside(self, members, fit)
+        if number == 0:
+            self.tried[key] = found
+        return found
 
 
-def compete(arena: Arena, *, rounds: int = ROUNDS) -> Posterior:
+def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -> Posterior:
     """The posterior over the sets that a search with swaps visits.
 
     The noise is that beside which the measurement is most likely, after one of the first candidates in the metrics of
     coloured and of white noise, or after the best set so far. Else a slow effect would count as noise and could not be
     found. The noise is sought with the whole likelihood, in at most so many rounds; the posterior has a share of it.
+    `begun`: of the same arena, where fewer rounds of it are known already.
     """
-    white = arena.white()
-    whitely = arena.tolerant(white)
-    deviations = _deviations(arena, white)
-    noise = _beside(deviations, (), None)
+    begun = begun or begin(arena)
+    noise = begun.after((), None)
     gram = arena.inner(noise.weighings)
-    known: dict[Members, _Noise] = {}  # after sets of the metric of white noise, which stays
-    for _ in range(rounds):
+    for number in range(rounds):
         tolerant = arena.tolerant(gram)
         sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram), width=ROUGHLY)
         best = max(sets, key=lambda k: sets[k])
-        coloured = [(m, fitted(arena, tolerant, m)) for m in _first(arena, tolerant, best)]
-        others = dict.fromkeys([*_first(arena, whitely, best), *_first(arena, whitely, ())[1:]])
-        new = [(m, fitted(arena, whitely, m)) for m in others if m not in known]
-        tried = beside(lambda s: _beside(deviations, *s), [*coloured, *new])
-        known |= {n.members: n for n in tried[len(coloured) :]}
+        coloured = [(m, fitted(arena, tolerant, m), number) for m in _first(arena, tolerant, best)]
+        others = dict.fromkeys([*_first(arena, begun.whitely, best), *_first(arena, begun.whitely, ())[1:]])
+        white = [(m, fitted(arena, begun.whitely, m), 0) for m in others]
+        tried = beside(lambda s: begun.after(*s), [*coloured, *white])
         # white noise is wrong: a second step is fairer
-        tried += [_after(deviations, max((known[m] for m in others), key=lambda n: n.likely))]
+        likeliest = max(tried[len(coloured) :], key=lambda n: n.likely)
+        tried += [begun.after(likeliest.members, likeliest.fit, number)]
         better = max(tried, key=lambda n: n.likely)
         if better.likely < noise.likely + CLEARLY:
             break
-        noise = max(better, _after(deviations, better), key=lambda n: n.likely)
+        noise = max(better, begun.after(better.members, better.fit, number), key=lambda n: n.likely)
         gram = arena.inner(noise.weighings)
     tolerant = arena.tolerant(COARSE * gram)
     sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram))
@@ -101,29 +111,26 @@ def _first(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
     return [best, *((*best, m) for m in first_of(arena.blocks, inner, arena.name, best))]
 
 
-def _deviations(arena: Arena, white: FloatArray) -> _Deviations:
+def begin(arena: Arena) -> Begun:
     """Main directions of the tolerances; what the others do is small beside white noise, smaller beside any other."""
+    white = arena.white()
     k = np.flatnonzero((np.diag(arena.tolerance) > 0.0) & (np.diag(white)[:-1] > 1e-12))
     P = arena.tolerance[np.ix_(k, k)]
     root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
     w, V = np.linalg.eigh(root.T @ white[np.ix_(k, k)] @ root)
     values = np.zeros((int((w > NEGLIGIBLE).sum()), arena.width))
     values[:, k] = (root @ V[:, w > NEGLIGIBLE]).T
-    drawn = (spectra(bridged(arena.made(i, values).astype(np.float32), p.mask)) for i, p in enumerate(arena.parts))
-    return _Deviations(arena, tuple(drawn))
+    columns = tuple(arena.made(i, values).astype(np.float32) for i in range(len(arena.parts)))
+    return Begun(arena, columns, arena.tolerant(white), {})
 
 
-def _after(deviations: _Deviations, noise: _Noise) -> _Noise:
-    return _beside(deviations, noise.members, noise.fit)
-
-
-def _beside(deviations: _Deviations, members: Members, fit: Fitted | None) -> _Noise:
+def _beside(begun: Begun, members: Members, fit: Fitted | None) -> _Noise:
     """The noise that a set of these values leaves: a step of expectation and maximisation [dempster1977].
 
     The set's values are not exactly known: draws of what is left keep the noise from being too small. What the car
     differs by anyway stays in the noise: it is of the size of the simulator's own errors, for which no noise stands.
     """
-    arena = deviations.arena
+    arena = begun.arena
     if fit is None or not members:
         left = [p.residual[None] for p in arena.parts]
     else:
@@ -132,7 +139,7 @@ def _beside(deviations: _Deviations, members: Members, fit: Fitted | None) -> _N
         values[:, fit.columns] = fit.mean + np.concatenate([z, -z])
         left = [p.residual - arena.made(i, values) for i, p in enumerate(arena.parts)]
     weighings = arena.weighed(left)
-    own, r = [], len(deviations.columns[0].values)
+    own, r = [], len(begun.columns[0])
     at = r
     for m in members:
         b = arena.blocks[m]
@@ -141,7 +148,7 @@ def _beside(deviations: _Deviations, members: Members, fit: Fitted | None) -> _N
     gram = np.zeros((at + 1, at + 1))
     for i, (p, w) in enumerate(zip(arena.parts, weighings, strict=True)):
         drawn = w.rows(np.concatenate([*(arena.drawn(i, arena.blocks[m]) for m in members), p.residual[None]]))
-        gram += products(np.concatenate([w.again(deviations.columns[i]), drawn], dtype=np.float32))
+        gram += products(np.concatenate([w.single(begun.columns[i]), drawn], dtype=np.float32))
     allowed = np.zeros((at, at))
     allowed[:r, :r] = np.eye(r)
     forgiven = forgiving(gram, allowed)

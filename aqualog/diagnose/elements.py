@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.arena import SHAPE_PRIOR, Arena
 from aqualog.diagnose.channels import contrasts
@@ -130,31 +131,44 @@ def _patches(name: str, x: FloatArray, weights: FloatArray, scores: FloatArray) 
     """For each row of weights (k, n), the offset that comes again after equal ways, or times, and explains most."""
     if not len(weights) or not np.isfinite(x).all() or np.ptp(x) <= 0.0:
         return [None] * len(weights)
-    low, span = float(x.min()), float(np.ptp(x))
     rates = np.arange(*AGAIN, AGAIN_STEP)
-    i, j = (k.ravel() for k in np.meshgrid(np.arange(PHASES), np.arange(1, PHASES // 2 + 1), indexing="ij"))
-    total, right = weights.sum(axis=1, keepdims=True), scores.sum(axis=1, keepdims=True)
-    best = np.zeros(len(weights))
     where = np.zeros((len(weights), 3))
-    values = np.concatenate([weights, scores]).ravel()
-    rows = np.repeat(np.arange(2 * len(weights)) * PHASES, x.size)
-    for f in rates.tolist():
-        # phases of one turn, twice: a patch may begin at the end of a turn
-        at = (np.mod((x - low) / span * f, 1.0) * PHASES).astype(np.intp)
-        folded = np.bincount(rows + np.tile(at, 2 * len(weights)), values, 2 * len(weights) * PHASES)
-        sums = np.cumsum(np.tile(folded.reshape(-1, PHASES), 2), axis=1)
-        sums = np.concatenate([np.zeros((len(sums), 1)), sums], axis=1)
-        within = sums[:, i + j] - sums[:, i]
-        a, b = within[: len(weights)], within[len(weights) :]
-        each = (b - a / total * right) ** 2 / np.maximum(a * (1.0 - a / total), 1e-9 * total)
-        k = each.argmax(axis=1)
-        top = each[np.arange(len(k)), k]
-        period = span / f
-        new = np.array([low + i[k] / PHASES * period, j[k] / PHASES * period, np.full(len(k), period)]).T
-        where = np.where((top > best)[:, None], new, where)
-        best = np.maximum(top, best)
-    tried = rates.size * i.size
+    _fold(x, rates, np.ascontiguousarray(weights), np.ascontiguousarray(scores), where)
+    tried = rates.size * PHASES * (PHASES // 2)
     return beside(lambda s: _patch(name, x, *s, tried), zip(weights, scores, where.tolist(), strict=True))
+
+
+@compiled
+def _fold(x, rates, weights, scores, where):  # type: ignore[no-untyped-def]
+    """Fill start, length and period of the patch that explains most, for each row of weights and scores (k, n)."""
+    low = x.min()
+    span = x.max() - low
+    at = np.empty(x.size, dtype=np.int64)
+    # phases of one turn, twice: a patch may begin at the end of a turn
+    sums = np.zeros((2, 2 * PHASES + 1))
+    best = np.zeros(len(weights))
+    for f in rates:
+        for t in range(x.size):
+            turns = (x[t] - low) / span * f
+            at[t] = int((turns - np.floor(turns)) * PHASES)
+        for k in range(len(weights)):
+            sums[:] = 0.0
+            for t in range(x.size):
+                sums[0, 1 + at[t]] += weights[k, t]
+                sums[1, 1 + at[t]] += scores[k, t]
+            for i in range(PHASES):
+                sums[:, 1 + i] += sums[:, i]
+            for i in range(1, PHASES + 1):
+                sums[:, PHASES + i] = sums[:, PHASES] + sums[:, i]
+            total, right = sums[0, PHASES], sums[1, PHASES]
+            for i in range(PHASES):
+                for j in range(1, PHASES // 2 + 1):
+                    a, b = sums[0, i + j] - sums[0, i], sums[1, i + j] - sums[1, i]
+                    gain = (b - a / total * right) ** 2 / max(a * (1.0 - a / total), 1e-9 * total)
+                    if gain > best[k]:
+                        best[k] = gain
+                        where[k, 0], where[k, 1] = low + i / PHASES * span / f, j / PHASES * span / f
+                        where[k, 2] = span / f
 
 
 def _patch(

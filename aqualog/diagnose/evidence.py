@@ -114,13 +114,14 @@ class Forgiven(NamedTuple):
 
 
 def forgiving(gram: FloatArray, tolerance: FloatArray) -> Forgiven:
-    """Inner products (K + 1, K + 1) in a metric that tolerates deviations of the covariance `tolerance` (K, K).
+    """Inner products of K columns and residuals in a metric that tolerates deviations of the covariance `tolerance`
+    (K, K).
 
     No vehicle file is exact and no simulator is the car: a radius may be 0.03 % off, a tyre's curve a few percent. With
     enough samples every such error is significant. The covariance of the residual is that of the noise plus that of all
     these deviations, I + X P X'. Woodbury's identity gives the inner products with its inverse.
     """
-    k = np.flatnonzero((np.diag(tolerance) > 0.0) & (np.diag(gram)[:-1] > 1e-12))
+    k = np.flatnonzero((np.diag(tolerance) > 0.0) & (np.diag(gram)[: len(tolerance)] > 1e-12))
     P = tolerance[np.ix_(k, k)]
     root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
     B = gram[:, k] @ root

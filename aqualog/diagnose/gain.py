@@ -15,7 +15,7 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import CHANNELS, block_means, block_step
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.hypotheses import residual
-from aqualog.diagnose.noise import Noise, bridged, for_mask, spectra, whitened
+from aqualog.diagnose.noise import Noise, bridged, for_mask, whitened
 from aqualog.diagnose.records import ChannelGain, Consequence, Gain
 from aqualog.model.follow import follow
 from aqualog.model.term import Model
@@ -309,7 +309,7 @@ def measured_gain(
         own = for_mask(noise, d.mask)
         # each model has its own target speed with which it meets the measured speed
         residuals = [residual(led_by(d, m), m) for m in (before, after)]
-        rows = [whitened(spectra(bridged(r, d.mask)[None]), own)[0].reshape(r.shape) for r in residuals]
+        rows = [whitened(bridged(r, d.mask)[None], own)[0].reshape(r.shape) for r in residuals]
         used = (own.weights > 0.0).any(axis=0)
         scores = [block_scores(np.where(used, w, np.nan), dt=block_step(d.dt)) for w in rows]
         free = [_free_speed(d, m) for m in (before, after)]

@@ -9,7 +9,7 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.hypotheses import value_in
-from aqualog.diagnose.noise import Noise, bridged, spectra, whitened
+from aqualog.diagnose.noise import Noise, bridged, whitened
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.words import name_of
 from aqualog.model.term import Model
@@ -66,7 +66,7 @@ def _by_third(
     for part, noise in zip(arena.parts, noises, strict=True):
         own, after = refit.signatures[part.drive][..., part.at], refit.residuals[part.drive][:, part.at]
         before = after + np.tensordot(off, own, axes=1)
-        rows = whitened(spectra(bridged(np.concatenate([own, before[None]]), part.mask)), noise)
+        rows = whitened(bridged(np.concatenate([own, before[None]]), part.mask), noise)
         rows = rows.reshape(k + 1, *after.shape)
         third = np.minimum(THIRDS * np.cumsum(part.mask) // max(int(part.mask.sum()), 1), THIRDS - 1)
         for t in range(THIRDS):

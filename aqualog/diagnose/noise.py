@@ -8,23 +8,23 @@ remainders are made uncorrelated across the combinations.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = [
-    "MEMORY", "Noise", "Spectra", "bridged", "fit_noise", "for_mask", "good_size", "spectra",
-    "white_noise", "whitened",
+    "MEMORY", "Noise", "bridged", "fit_noise", "for_mask", "good_size", "white_noise", "whitened",
 ]  # fmt: skip
 
 # lags of the autoregression, from ... to, as means [samples]
 _BLOCKS = (
     (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (6, 6), (7, 10), (11, 18), (19, 34), (35, 66), (67, 130),
 )  # fmt: skip
-_ORDERS = (1, 2, 3, 4, 6, 8, 9, 10, 11)
+_EDGES = np.array([0, *(b for _, b in _BLOCKS)])
+_ORDERS = np.array([1, 2, 3, 4, 6, 8, 9, 10, 11])
 MEMORY = 130
 AFTER_GAP = 6  # [samples] whose past is bridged
 HUBER = 3.0  # [sd] larger innovations weigh less
@@ -59,20 +59,6 @@ class Noise:
         return float((self.weights**2).sum())
 
 
-@dataclass(frozen=True, slots=True)
-class Spectra:
-    """Residual-shaped arrays (k, C, n) ready for whitening: transforms of them with a quiet past in front."""
-
-    values: FloatArray
-    transform: np.ndarray[tuple[int, ...], np.dtype[np.complex128]]
-    size: int
-    n: int
-
-    def of(self, rows: Sequence[int]) -> Spectra:
-        """Some of the arrays."""
-        return Spectra(self.values[list(rows)], self.transform[list(rows)], self.size, self.n)
-
-
 def bridged(x: FloatArray, mask: BoolArray) -> FloatArray:
     """Masked samples by straight lines between usable ones, in the precision of x. (..., n)"""
     if mask.all():
@@ -88,15 +74,6 @@ def bridged(x: FloatArray, mask: BoolArray) -> FloatArray:
     out = x.copy()
     out[..., bad] = (1.0 - share) * x[..., left] + share * x[..., right]
     return out
-
-
-def spectra(x: FloatArray) -> Spectra:
-    """Transforms of arrays (k, C, n), bridged, in their precision; their first second replaces the unknown past."""
-    n = x.shape[-1]
-    past = np.repeat(x[..., :10].mean(axis=-1, keepdims=True), MEMORY, axis=-1)
-    size = good_size(n + 2 * MEMORY + 1)
-    transform = np.fft.rfft(np.concatenate([past, x], axis=-1), size, axis=-1)
-    return Spectra(x, transform, size, n)
 
 
 def good_size(n: int) -> int:
@@ -142,7 +119,7 @@ def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> N
     for _ in range(2):
         for c in range(C):
             taps[c] = _autoregression(z[c], weights[c], (FLOOR / float(scale[c])) ** 2)
-        e = _filtered(z, taps)
+        e = whitened(z[None], Noise(np.eye(C), taps, np.eye(C), np.ones((C, 1)))).reshape(C, n)
         local = _local(e, used)
         size = np.abs(e) / local
         robust = np.where(size > HUBER, HUBER / np.maximum(size, 1e-12), 1.0) * used
@@ -173,15 +150,20 @@ def for_mask(noise: Noise, mask: BoolArray) -> Noise:
 def _local(e: FloatArray, used: BoolArray) -> FloatArray:
     """Size of innovations (C, n) over the samples around each: rough roads and slow wheels make more noise. (C, n)"""
     usual: FloatArray = 1.4826 * np.median(np.abs(e[:, used]), axis=1, keepdims=True) + 1e-15
-    window = np.ones(2 * AROUND + 1)
-    count = np.convolve(used, window, "same") + FEW
+    count = _around(used.astype(np.float64)) + FEW
     local = np.broadcast_to(usual, e.shape)
     for _ in range(2):
         # an outlier must not make its neighbours look small, nor a rough stretch its own samples look like outliers
         square = np.where(used, np.minimum(np.abs(e), HUBER * local), 0.0) ** 2
         # samples of the whole drive besides: a stretch with few of its own has the size of all
-        local = np.sqrt((np.array([np.convolve(x, window, "same") for x in square]) + usual**2 * FEW) / count)
+        local = np.sqrt((_around(square) + usual**2 * FEW) / count)
     return np.asarray(local)
+
+
+def _around(x: FloatArray) -> FloatArray:
+    """Sums over the samples around each. (..., n)"""
+    total = np.cumsum(np.pad(x, [(0, 0)] * (x.ndim - 1) + [(AROUND + 1, AROUND)]), axis=-1)
+    return np.asarray(total[..., 2 * AROUND + 1 :] - total[..., : -2 * AROUND - 1])
 
 
 def _settled(mask: BoolArray) -> BoolArray:
@@ -195,25 +177,20 @@ def _settled(mask: BoolArray) -> BoolArray:
 
 def _autoregression(z: FloatArray, weights: FloatArray, white: float) -> FloatArray:
     """Taps (131,) of the whitening filter of one channel: weighted least squares, order by Akaike's criterion."""
-    n = z.size
-    padded = np.concatenate([np.full(MEMORY, z[:10].mean()), z])
-    total = np.concatenate([[0.0], np.cumsum(padded)])
-    at = np.arange(n) + MEMORY
-    columns = [(total[at - a + 1] - total[at - b]) / (b - a + 1) for a, b in _BLOCKS]
-    A = np.array(columns) * np.sqrt(weights)
-    y = z * np.sqrt(weights)
+    total = np.cumsum(np.concatenate([[0.0], np.full(MEMORY, z[:10].mean()), z]))
+    totals = np.array([total[MEMORY - b : MEMORY - b + z.size] for b in _EDGES.tolist()])
+    root = np.sqrt(weights)
+    A = (totals[:-1] - totals[1:]) / np.diff(_EDGES)[:, None] * root
+    y = z * root
     gram, right, power = A @ A.T, A @ y, float(y @ y)
     count = max(float(weights.sum()), 10.0)
     # as if white noise of the floor were added: of means over blocks it leaves less
     power += count * white
     gram += RIDGE * np.diag(np.diag(gram)) + np.diag([count * white / (b - a + 1) + 1e-30 for a, b in _BLOCKS])
-    best, chosen = np.inf, np.zeros(0)
-    for order in _ORDERS:
-        phi = np.linalg.solve(gram[:order, :order], right[:order])
-        rest = max(power - float(phi @ right[:order]), 1e-30)
-        criterion = count * np.log(rest) + 2.0 * order
-        if criterion < best:
-            best, chosen = criterion, phi
+    # orders are leading blocks of one factor: what each explains is a sum of squares
+    explained = np.cumsum(np.linalg.solve(np.linalg.cholesky(gram), right) ** 2)[_ORDERS - 1]
+    order = _ORDERS[np.argmin(count * np.log(np.maximum(power - explained, 1e-30)) + 2.0 * _ORDERS)]
+    chosen = np.linalg.solve(gram[:order, :order], right[:order])
     taps = np.zeros(MEMORY + 1)
     taps[0] = 1.0
     for share, (a, b) in zip(chosen.tolist(), _BLOCKS, strict=False):
@@ -221,26 +198,52 @@ def _autoregression(z: FloatArray, weights: FloatArray, white: float) -> FloatAr
     return taps
 
 
-def _filtered(z: FloatArray, taps: FloatArray) -> FloatArray:
-    n = z.shape[-1]
-    past = np.repeat(z[:, :10].mean(axis=1, keepdims=True), MEMORY, axis=1)
-    size = good_size(n + 2 * MEMORY + 1)
-    y = np.fft.irfft(np.fft.rfft(np.concatenate([past, z], axis=1), size) * np.fft.rfft(taps, size), size)
-    return y[:, MEMORY : MEMORY + n]
+def whitened(x: FloatArray, noise: Noise) -> FloatArray:
+    """Arrays (k, C, n), bridged, as independent unit innovations, flat: (k, C n).
 
-
-def whitened(x: Spectra, noise: Noise) -> FloatArray:
-    """Arrays (k, C, n) as independent unit innovations, flat: (k, C n).
-
-    Inner products of whitened arrays are in units of twice the log-likelihood; masked samples are zero.
+    Their first second replaces the unknown past. Inner products of whitened arrays are in units of twice the
+    log-likelihood; masked samples are zero.
     """
-    kind = x.values.dtype
-    filters = np.fft.rfft(noise.taps, x.size).astype(x.transform.dtype)
-    rotation, weights, shaping = (a.astype(kind) for a in (noise.rotation, noise.weights, noise.shaping))
-    k = x.transform.shape[0]
-    out = np.empty((k, noise.taps.shape[0], x.n), dtype=kind)
-    for i in range(k):
-        z = (rotation @ x.transform[i]) * filters
-        e = np.fft.irfft(z, x.size)[:, MEMORY : MEMORY + x.n]
-        out[i] = shaping @ (e * weights)
-    return out.reshape(k, out.shape[1] * x.n)
+    out = np.empty(x.shape)
+    shares = np.diff(np.pad(-noise.taps[:, [a for a, _ in _BLOCKS]], [(0, 0), (1, 1)]))
+    weights = np.broadcast_to(noise.weights, x.shape[1:])
+    _whiten(np.ascontiguousarray(x), noise.rotation, shares, weights, noise.shaping, out)
+    return out.reshape(len(x), -1)
+
+
+@compiled
+def _whiten(x, rotation, shares, weights, shaping, out):  # type: ignore[no-untyped-def]
+    """Fill the innovations of arrays: what each combination is beyond its last samples and means over blocks of them.
+
+    Means over blocks are differences of running totals: `shares` (C, 12) are those of the totals up to each edge.
+    """
+    _, C, n = x.shape
+    e = np.empty((C, n))
+    z = np.empty(n + MEMORY)
+    total = np.zeros(n + MEMORY + 1)
+    for i in range(x.shape[0]):
+        for c in range(C):
+            now, own = z[MEMORY:], e[c]
+            now[:] = 0.0
+            for j in range(C):
+                share = rotation[c, j]
+                for t in range(n if share != 0.0 else 0):
+                    now[t] += share * x[i, j, t]
+            z[:MEMORY] = now[:10].mean()
+            for t in range(n + MEMORY):
+                total[t + 1] = total[t] + z[t]
+            own[:] = now
+            for b in range(0, _EDGES.size, 4):
+                p, q, r, s = shares[c, b], shares[c, b + 1], shares[c, b + 2], shares[c, b + 3]
+                P, Q = total[MEMORY - _EDGES[b] :], total[MEMORY - _EDGES[b + 1] :]
+                R, S = total[MEMORY - _EDGES[b + 2] :], total[MEMORY - _EDGES[b + 3] :]
+                for t in range(n):
+                    own[t] -= p * P[t] + q * Q[t] + r * R[t] + s * S[t]
+            own *= weights[c]
+        for c in range(C):
+            to = out[i, c]
+            to[:] = 0.0
+            for j in range(c + 1):  # the inverse of a Cholesky factor
+                share = shaping[c, j]
+                for t in range(n):
+                    to[t] += share * e[j, t]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -34,6 +34,7 @@ from aqualog.diagnose.outcome import Outcome, conclude, with_causes
 from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, ResidualView, Verdict
 from aqualog.diagnose.search import Found, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
+from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unknown_term import as_term, short_form
 from aqualog.diagnose.words import term_words, verdict_sentence
 from aqualog.model.term import Model
@@ -124,14 +125,15 @@ def diagnose(
     sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.inflation, threshold)
     before = [residual(d, model) for d in ready] if road is None else [_led(d, bare) for d in ready]
     after = before if extended.terms == bare.terms else [_led(d, extended) for d in ready]
-    gained = None
-    if extended.terms != bare.terms:
-        tell("measuring the gain", 0.8)
-        gained = _gained(ready, holdout, vehicle, bare, extended, noises[0], options)
-    next_run = None
-    if outcome.verdict == "cannot_tell":
-        tell("searching for a run that distinguishes the causes", 0.95)
-        next_run = next_manoeuvre(evidence, outcome.rivals, noises, model)
+    differs, is_unclear = extended.terms != bare.terms, outcome.verdict == "cannot_tell"
+    tell("searching for a run that distinguishes the causes" if is_unclear else "measuring the gain", 0.8)
+    last: list[Callable[[], Any]] = []
+    if differs:
+        last.append(lambda: _gained(ready, holdout, vehicle, bare, extended, noises[0], options))
+    if is_unclear:
+        last.append(lambda: next_manoeuvre(evidence, outcome.rivals, noises, model))
+    done = beside(lambda f: f(), last) if len(last) > 1 else [f() for f in last]
+    gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
     return Diagnosis(
         verdict=outcome.verdict,
         sentence=_sentence(outcome, found, options, untested),

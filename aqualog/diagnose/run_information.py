@@ -17,7 +17,7 @@ from aqualog.diagnose.drive import Drive, prepare
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.manoeuvres import Run, Sensor, programme, turned
-from aqualog.diagnose.noise import Noise, bridged, for_mask, spectra, whitened
+from aqualog.diagnose.noise import Noise, bridged, for_mask, whitened
 from aqualog.diagnose.outcome import Rival
 from aqualog.diagnose.refit import PRIOR_WIDTH
 from aqualog.model.log import as_signals
@@ -93,8 +93,8 @@ def of_log(case: Case) -> FloatArray:
     total: FloatArray | float = 0.0
     for d, (drive, noise) in enumerate(zip(case.evidence.drives, case.noises, strict=True)):
         parts = [c.refit.residuals[d][None] for c in case.rivals] + [c.refit.signatures[d] for c in case.rivals]
-        rows = whitened(spectra(bridged(np.concatenate(parts), drive.mask)), noise)
-        kept = spectra(bridged(case.evidence.signatures[d][[x[0] for x in case.tolerances]], drive.mask))
+        rows = whitened(bridged(np.concatenate(parts), drive.mask), noise)
+        kept = bridged(case.evidence.signatures[d][[x[0] for x in case.tolerances]], drive.mask)
         rows = np.concatenate([rows, whitened(kept, noise)])
         total = total + rows @ rows.T
     return np.asarray(COARSE * total)
@@ -198,7 +198,7 @@ def _weighed(case: Case, drive: Drive, rows: FloatArray) -> FloatArray:
     """Rows (k, C, m), the driven set's first, by the noise of the log; channels that it lacks by assumed noise."""
     count = len(case.drive.channels)
     noise = for_mask(case.noises[case.like], drive.mask)
-    out = whitened(spectra(bridged(rows[:, :count], drive.mask)), noise)
+    out = whitened(bridged(rows[:, :count], drive.mask), noise)
     # the simulation's error for the driven set counts as noise, because a real run has it too
     of_channels = out.reshape(len(out), count, -1)
     missed = (of_channels[0] ** 2).sum(axis=-1) / max(int(drive.mask.sum()), 1)

@@ -18,7 +18,7 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import Arena, known_only, make_arena
 from aqualog.diagnose.channels import CHANNELS
-from aqualog.diagnose.compete import Members, Posterior, compete, fitted
+from aqualog.diagnose.compete import Members, Posterior, begin, compete, fitted
 from aqualog.diagnose.competition import COARSE, added, forgiving, start
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import with_elements
@@ -113,8 +113,13 @@ def search(
     arena = make_arena(evidence, model)
     # a first answer for whom waits: a tenth of the time that the whole takes
     first = known_only(arena, ())
-    tell(f"at first sight {_likeliest(first, compete(first, rounds=1))}; comparing with unknown forms", 0.25)
-    arena = with_elements(arena)
+    begun = begin(first)
+
+    def look() -> None:
+        posterior = compete(first, rounds=1, begun=begun)
+        tell(f"at first sight {_likeliest(first, posterior)}; comparing with unknown forms", 0.25)
+
+    arena = beside(lambda f: f(), [look, lambda: with_elements(arena)])[1]
     posterior = compete(arena)
     k = np.r_[np.arange(evidence.count), -1]
     scale = np.append(arena.sd[: evidence.count], 1.0)
@@ -132,8 +137,8 @@ def search(
     roads = [
         b for i, b in enumerate(arena.blocks) if b.kind == "road" and posterior.blocks.get(i, 0.0) >= HALF
     ]  # fmt: skip
-    arena = known_only(arena, roads)
-    posterior = compete(arena)
+    arena = known_only(arena, roads) if roads else first
+    posterior = compete(arena, begun=None if roads else begun)
     arena, posterior = _repeated(evidence, arena, posterior, model)
     tell(f"so far {_likeliest(arena, posterior)}; refitting in the simulator", 0.7)
     options = _refitted(evidence, arena, posterior, model)

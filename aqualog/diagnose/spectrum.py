@@ -7,16 +7,16 @@ column under noise alone follows its chi-squared distribution. Surrogates of the
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.diagnose.noise import Noise, Spectra, bridged, fit_noise, good_size, spectra, whitened
+from aqualog.diagnose.noise import Noise, bridged, fit_noise, good_size, whitened
 from aqualog.diagnose.threads import beside
 
 __all__ = ["Weighing", "weighing"]
@@ -25,7 +25,7 @@ BANDWIDTH = 0.3  # of the frequency: share that spectra are averaged over to eit
 NARROWEST, WIDEST = 10, 40  # bins to either side
 SLOPED = 60  # lines whose power may follow a power law
 FASTEST_HZ, BLOCK_S = 1.5, 0.1  # half of the log-likelihood counts there: cars pitch at 1 to 2 Hz (K); samples' step
-CHUNK = 24  # columns that are transformed together
+CHUNK, TILE = 6, 256  # columns, and their lines, that are transformed together and stay in the processor's memory
 
 Complex = npt.NDArray[np.complex128]
 
@@ -34,22 +34,23 @@ Complex = npt.NDArray[np.complex128]
 class Weighing:
     """Turns residual-shaped arrays (C, n) of one drive into rows whose inner products are twice log-likelihoods.
 
-    `inverse` (F, C, C): roots of the inverse cross spectra of the whitened remainder, `used` (n,) its samples;
-    `sharpness`: half the log determinant of the noise's covariance, without a constant, so that half the inner product
-    of a residual with itself and this is its negative log-likelihood.
+    `inverse` (2, C, C, F): real and imaginary parts of roots of the inverse cross spectra of the whitened remainder,
+    lower triangular, scaled so that the squares of lines sum to the signal's; `used` (n,) its samples. `sharpness`:
+    half the log determinant of the noise's covariance, without a constant, so that half the inner product of a residual
+    with itself and this is its negative log-likelihood.
     """
 
     noise: Noise
     mask: BoolArray
     used: BoolArray
-    inverse: Complex
+    inverse: FloatArray
     size: int
     sharpness: float
 
     @property
     def width(self) -> int:
         """Length of a row."""
-        return int(2 * self.inverse.shape[0] * self.inverse.shape[1])
+        return int(2 * self.inverse.shape[2] * self.inverse.shape[3])
 
     def surprise(self, residual: FloatArray) -> float:
         """Negative log-likelihood of a residual (C, n), without a constant."""
@@ -58,36 +59,46 @@ class Weighing:
 
     def rows(self, x: FloatArray) -> FloatArray:
         """Arrays (k, C, n) as rows (k, M)."""
-        return self._chunks(len(x), lambda at: self._transformed(x[at], np.float64), np.float64)
-
-    def again(self, x: Spectra) -> FloatArray:
-        """The rows of arrays whose transforms are known: they stay the same for every noise."""
-        return self._chunks(len(x.values), lambda at: self._rows(x.of(range(at.start, at.stop))), x.values.dtype)
+        return self._transformed(x, np.float64)
 
     def single(self, x: FloatArray) -> npt.NDArray[np.float32]:
-        """The same in single precision, which takes half of memory and time."""
-        rows: npt.NDArray[Any] = self._chunks(len(x), lambda at: self._transformed(x[at], np.float32), np.float32)
+        """The same in single precision, which takes half of memory."""
+        rows: npt.NDArray[Any] = self._transformed(x, np.float32)
         return rows
 
-    def _chunks(self, count: int, rows: Callable[[slice], FloatArray], kind: npt.DTypeLike) -> FloatArray:
-        """Rows of `count` arrays, chunk by chunk in two threads."""
-        out: FloatArray = np.empty((count, self.width), dtype=kind)
+    def _transformed(self, x: FloatArray, kind: npt.DTypeLike) -> FloatArray:
+        out: FloatArray = np.empty((len(x), self.width), dtype=kind)
 
         def fill(i: int) -> None:
-            at = slice(i, min(i + CHUNK, count))
-            out[at] = rows(at)
+            own = x[i : i + CHUNK]
+            flat = whitened(bridged(own, self.mask), self.noise).reshape(own.shape)
+            lines = np.fft.rfft(flat if self.used.all() else flat[..., self.used], self.size)
+            _unrelated(lines, self.inverse, out[i : i + CHUNK].reshape(len(own), 2, *lines.shape[1:]))
 
-        beside(fill, range(0, count, CHUNK))
+        beside(fill, range(0, len(x), CHUNK))
         return out
 
-    def _transformed(self, x: FloatArray, kind: npt.DTypeLike) -> FloatArray:
-        return self._rows(spectra(bridged(np.asarray(x, dtype=kind), self.mask)))
 
-    def _rows(self, x: Spectra) -> FloatArray:
-        flat = whitened(x, self.noise).reshape(x.values.shape)
-        each = _lines(flat[..., self.used], self.size)
-        lines = np.matmul(self.inverse.astype(each.dtype), each.transpose(2, 1, 0))  # (F, C, k)
-        return np.concatenate([lines.real, lines.imag]).reshape(-1, len(flat)).T
+@compiled
+def _unrelated(lines, inverse, out):  # type: ignore[no-untyped-def]
+    """Fill real and imaginary parts (k, 2, C, F) of the channels' lines (k, C, F), made independent of each other."""
+    k, C, F = lines.shape
+    x, re, im = np.empty((2, C, TILE)), np.empty(TILE), np.empty(TILE)
+    for low in range(0, F, TILE):
+        n = min(TILE, F - low)
+        at = slice(low, low + n)
+        for i in range(k):
+            x[0, :, :n], x[1, :, :n] = lines[i, :, at].real, lines[i, :, at].imag
+            for c in range(C):
+                re[:] = 0.0
+                im[:] = 0.0
+                for j in range(c + 1):
+                    a, b, p, q = inverse[0, c, j, at], inverse[1, c, j, at], x[0, j], x[1, j]
+                    for f in range(n):
+                        re[f] += a[f] * p[f] - b[f] * q[f]
+                        im[f] += a[f] * q[f] + b[f] * p[f]
+                out[i, 0, c, at] = re[:n]
+                out[i, 1, c, at] = im[:n]
 
 
 def weighing(
@@ -101,7 +112,7 @@ def weighing(
     used = np.asarray((noise.weights > 0.0).any(axis=0))
     count = int(used.sum())
     size = good_size(count)
-    e = whitened(spectra(bridged(np.array(residuals), mask)), noise).reshape(-1, *residuals[0].shape)
+    e = whitened(bridged(np.array(residuals), mask), noise).reshape(-1, *residuals[0].shape)
     raw = np.fft.rfft(e[..., used], size).transpose(0, 2, 1) / np.sqrt(count)  # (draws, F, C)
     pilot = _power_law((np.abs(raw[:, 1:]) ** 2).mean(axis=0))
     pilot = np.concatenate([pilot[:1], pilot])
@@ -111,29 +122,21 @@ def weighing(
     cross += 1e-6 * np.trace(cross, axis1=1, axis2=2).real[:, None, None] * np.eye(raw.shape[-1])
     root = np.linalg.cholesky(cross) * pilot[:, :, None]
     counts = _trusted(np.arange(raw.shape[1]) / size)
-    inverse = np.sqrt(counts)[:, None, None] * np.linalg.inv(root).astype(np.complex128)
     lines = np.full(raw.shape[1], 2.0)
     lines[0] = 1.0
+    scale = np.where((np.arange(len(lines)) == 0) | (2 * np.arange(len(lines)) == size), 1.0, 2.0) / size
+    inverse = np.sqrt(counts * scale) * np.linalg.inv(root).transpose(1, 2, 0)
     logdet = 2.0 * np.log(np.abs(np.diagonal(root, axis1=1, axis2=2))).sum(axis=1)
     logdet -= 2.0 * np.log(np.abs(np.fft.rfft(noise.taps, size)) + 1e-12).sum(axis=0)
     share = float(lines @ counts / lines.sum())
     sharpness = share * noise.sharpness + 0.5 * count / size * float((lines * counts) @ logdet)
-    return Weighing(noise, mask, used, inverse, size, sharpness)
+    return Weighing(noise, mask, used, np.array([inverse.real, inverse.imag]), size, sharpness)
 
 
 def _trusted(f: FloatArray) -> FloatArray:
     """Share of the log-likelihood that counts at frequencies f [1/sample]: a simulator without suspension, driveline
     and the tyres' own motion says little of a car's fast movements."""
     return np.asarray(1.0 / (1.0 + (f / (FASTEST_HZ * BLOCK_S)) ** 4))
-
-
-def _lines(x: FloatArray, size: int) -> Complex:
-    """Fourier lines (..., F), scaled so that their squares sum to the signal's."""
-    lines = np.fft.rfft(x, size, axis=-1) * math.sqrt(2.0 / size)
-    lines[..., 0] *= math.sqrt(0.5)
-    if size % 2 == 0:
-        lines[..., -1] *= math.sqrt(0.5)
-    return np.asarray(lines)
 
 
 def _power_law(power: FloatArray) -> FloatArray:

@@ -300,7 +300,7 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
         y[i] = m.y[i]
     wanted = MOTION_WIDTH if p.motion_only > 0.0 else WIDTH
     needs_detail = lanes.shape[0] > 0 or p.steering_friction > 0.0  # what a step leaves for later ones
-    rows = np.zeros((n // every + 1, wanted))
+    rows = np.zeros((wanted, n // every + 1)).T  # each column in one piece
     cells = 2 + int((n * dt * 120.0 + 50.0) / p.ds) if lanes.shape[0] > 0 else 2
     track = np.zeros((cells, 3))
     track[:, 0] = -1.0

@@ -163,7 +163,8 @@ def _measure_group(truth: Truth, sensors: Sensors, group: Group, rate_hz: float,
 
 def _through(channel: Channel, x: FloatArray, at: FloatArray, name: str, draw_key: str, seed: int) -> FloatArray:
     """Apply gain, offset, drift, noise and rounding; neutral values are skipped: a perfect channel keeps the bits."""
-    draws = _stream(seed, draw_key, "spread").standard_normal(3)
+    is_random = channel.gain_spread != 0.0 or channel.offset_spread != 0.0 or channel.drift_spread != 0.0
+    draws = _stream(seed, draw_key, "spread").standard_normal(3) if is_random else np.zeros(3)
     gain = channel.gain * (1.0 + channel.gain_spread * draws[0])
     offset = channel.bias + channel.offset_spread * draws[1]
     drift = channel.drift + channel.drift_spread * draws[2]

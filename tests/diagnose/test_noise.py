@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aqualog.diagnose.noise import MEMORY, bridged, fit_noise, for_mask, spectra, whitened
+from aqualog.diagnose.noise import MEMORY, bridged, fit_noise, for_mask, whitened
 
 N = 6000
 
@@ -29,7 +29,7 @@ def coloured(seed, n=N):
 
 
 def unit(x, noise):
-    return whitened(spectra(x[None]), noise)[0].reshape(x.shape)
+    return whitened(x[None], noise)[0].reshape(x.shape)
 
 
 def lagged(z, lag):
@@ -134,7 +134,7 @@ def test_bridges_are_straight():
 def test_what_came_before_the_log_is_its_first_second():
     x = np.full((1, 1, 500), 3.0)
     noise = fit_noise(coloured(10, 1000)[:1], np.ones(1000, dtype=bool), np.eye(1))
-    z = whitened(spectra(x), for_mask(noise, np.ones(500, dtype=bool)))[0]
+    z = whitened(x, for_mask(noise, np.ones(500, dtype=bool)))[0]
     np.testing.assert_allclose(z[:MEMORY], z[-1], rtol=1e-6)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import Drive, prepare
 from aqualog.diagnose.hypotheses import hypotheses, residual, signatures
-from aqualog.diagnose.noise import Noise, bridged, fit_noise, spectra, whitened
+from aqualog.diagnose.noise import Noise, bridged, fit_noise, whitened
 from aqualog.model.term import Model
 
 __all__ = ["Drive", "Noise", "noise_of", "prepare", "residual", "shapes", "unit_innovations"]
@@ -22,7 +22,7 @@ def noise_of(drive: Drive, x: np.ndarray) -> Noise:
 
 def unit_innovations(drive: Drive, noise: Noise, x: np.ndarray) -> np.ndarray:
     """A residual-shaped array (C, n), finite, as unit innovations (N,)."""
-    return np.asarray(whitened(spectra(bridged(x, drive.mask)[None]), noise)[0])
+    return np.asarray(whitened(bridged(x, drive.mask)[None], noise)[0])
 
 
 def shapes(drive: Drive) -> Mapping[str, np.ndarray]:
