@@ -23,7 +23,7 @@ __all__ = [
 
 
 MAP_HINT = "`aqualog init LOG -o FOLDER` writes a signal map; then the log with --signals FOLDER/map.toml"
-"""What to try where signals are missing."""
+"""What to try where signals are missing and there is no map."""
 
 EACH_ITS_OWN = "name one channel each in a signal map; `aqualog inspect LOG` lists them"
 """What to try where signals and channels do not go together one by one."""
@@ -74,6 +74,12 @@ class SignalMap:
     time_unit: str | None = None
     path: str = ""
     csv: Mapping[str, CsvFormat] = field(default_factory=dict)
+
+    @property
+    def hint(self) -> str:
+        """What to try where signals are missing."""
+        named = "`aqualog inspect LOG` lists what the log has; the signal map must name these"
+        return named if self.entries else MAP_HINT
 
     def clock_of(self, file: str) -> SourceClock:
         """Return the clock correction of a file, by name or glob pattern."""
