@@ -165,7 +165,7 @@ def test_vehicle_file_holds_values_and_intervals(series, tmp_path):
     assert "h_cg" not in loaded.given
     assert "# h_cg = " in text
     low, high = result.get("mass").ci95
-    assert f"95 %: {low:.5g} ... {high:.5g}" in text
+    assert f"95 %: {low:.0f} ... {high:.0f}" in text
     assert "# - torque_gain: mass and torque gain are one ratio" in text
     assert result.spread == {}  # two drives do not show how drives differ
     assert "[spread]" not in text
@@ -299,7 +299,7 @@ def test_the_drag_area_of_a_kept_mass_has_an_interval_of_its_own(series, tmp_pat
     assert kept.ci95 == pytest.approx([factor * x for x in taken.ci95], rel=1e-3)
     result = calibrate(signals, ["a", "b"], light)
     (line,) = (x for x in calibrated_toml(light, result).splitlines() if x.startswith("drag_area") and "95 %" in x)
-    assert f"95 %: {kept.ci95[0]:.5g} ... {kept.ci95[1]:.5g}" in line
+    assert f"95 %: {kept.ci95[0]:.2f} ... {kept.ci95[1]:.2f}" in line
     assert f"drag_area = {kept.value:.7g}" in line
 
 
