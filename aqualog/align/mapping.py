@@ -23,7 +23,7 @@ __all__ = [
 
 
 MAP_HINT = "`aqualog init LOG -o FOLDER` writes a signal map; then the log with --signals FOLDER/map.toml"
-"""What to try where signals are missing."""
+"""What to try where signals are missing and there is no map."""
 
 EACH_ITS_OWN = "name one channel each in a signal map; `aqualog inspect LOG` lists them"
 """What to try where signals and channels do not go together one by one."""
@@ -74,6 +74,12 @@ class SignalMap:
     time_unit: str | None = None
     path: str = ""
     csv: Mapping[str, CsvFormat] = field(default_factory=dict)
+
+    @property
+    def hint(self) -> str:
+        """What to try where signals are missing."""
+        named = "`aqualog inspect LOG` lists what the log has; the signal map must name these"
+        return named if self.entries else MAP_HINT
 
     def clock_of(self, file: str) -> SourceClock:
         """Return the clock correction of a file, by name or glob pattern."""
@@ -149,14 +155,15 @@ _SHARED = ("pressure_", "water_depth")
 def read_alike(one: Entry, other: Entry) -> bool:
     """Return whether two entries would give one channel twice: at the same scale, and not as one value for both wheels.
 
-    Such a line is a slip: wheels that never differ. Axles may share a torque by a scale, each a part of it.
+    Such a line is a slip: wheels that never differ. Two of one kind, as `omega_fl` and `omega_fr`, are one at any scale
+    or unit. Axles may share a torque by a scale, each a part of it.
     """
     if one.symbol.startswith("torque_") and other.symbol.startswith("torque_"):
         is_pair = len(one.symbol) == len(other.symbol) == len("torque_fl") and one.symbol[7] == other.symbol[7]
         return not is_pair and (one.unit, one.scale) == (other.unit, other.scale) and one.scale == 1.0
     if any(one.symbol.startswith(s) and other.symbol.startswith(s) for s in _SHARED):
         return False
-    return (one.unit, one.scale) == (other.unit, other.scale)
+    return one.symbol[:-2] == other.symbol[:-2] or (one.unit, one.scale) == (other.unit, other.scale)
 
 
 def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str, tuple[Entry, ChannelInfo]]:

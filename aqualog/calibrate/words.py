@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from aqualog.calibrate.balance import CLIMB_SD, Sample
 from aqualog.calibrate.records import DriveFit, Parameter
+from aqualog.core.intervals import NOWHERE, same_decimals
 from aqualog.core.vehicle import Key
 
 __all__ = [
@@ -75,18 +76,18 @@ def contradictions(found: Sequence[Parameter], gain: float, *, accepted: bool) -
     """
     said = []
     for p in found:
-        low, high = p.ci95
+        value, low, high = same_decimals(p.value, p.ci95)
         unit = f" {p.unit}" if p.unit != "-" else ""
         text = (
-            f"the vehicle file says {p.name} = {p.file_value:.5g}{unit}, but the drives show {p.value:.5g} "
-            f"(95 % {low:.5g} to {high:.5g})"
+            f"the vehicle file says {p.name} = {p.file_value:.5g}{unit}, but the drives show {value} "
+            f"(95 % {low} to {high})"
         )
         if accepted:
             said.append(f"{text}: their value is taken")
         elif p.name == "mass":
             said.append(
                 f"{text}: the file's value is kept. If the car was weighed, the torques are wrong: --fix "
-                f"mass={p.file_value:.5g} gives a torque gain of {gain * p.file_value / p.value:.3g}. If not, --accept "
+                f"mass={p.file_value:.5g} gives a torque gain of {gain * p.file_value / p.value:.3f}. If not, --accept "
                 "takes the drives' values"
             )
         else:
@@ -137,11 +138,11 @@ def notes(
     samples: Sequence[Sample],
     found: Mapping[str, float],
     fixed: Mapping[str, float],
-    written: Collection[str],
+    written: Mapping[str, tuple[float, Parameter]],
     *,
     by_drive: bool,
 ) -> list[str]:
-    """Return what a reader should know of the result; `written` are the keys that the vehicle file gets."""
+    """Return what a reader should know of the result; `written` are the values that the vehicle file gets, by key."""
     said = []
     alone = float(np.median([f.mass for f in fits if math.isfinite(f.mass)] or [math.nan]))
     if {"mass", "torque_gain"} <= set(fixed) and abs(alone / fixed["mass"] - 1.0) > CONTRADICTION:
@@ -150,17 +151,18 @@ def notes(
             f"{alone:.0f} kg, not {fixed['mass']:g}; give one of the two"
         )
     mass, gain = found.get("mass", math.nan), found.get("torque_gain", 1.0)
+    shown, *_ = same_decimals(gain, written["torque_gain"][1].ci95 if "torque_gain" in written else NOWHERE)
     if (not PLAUSIBLE_MASS[0] < mass < PLAUSIBLE_MASS[1] and math.isfinite(mass)) or not 0.5 < gain < 2.0:
         said.append(
-            f"a mass of {mass:.0f} kg with a torque gain of {gain:.2f} is hardly that of a "
+            f"a mass of {mass:.0f} kg with a torque gain of {shown} is hardly that of a "
             "car. Is the torque that of the motor, without the reduction? (scale in the signal map)"
         )
     if abs(gain - 1.0) > GAIN_NOTED:
         said.append(
-            f"the torques are {gain:.3f} of what was read: torque_gain in the calibrated vehicle file "
+            f"the torques are {shown} of what was read: torque_gain in the calibrated vehicle file "
             "corrects them on reading; a signal map that does so already must not do it twice"
             if "torque_gain" in written
-            else f"the torques seem to be {gain:.3f} of what was read, but the drives do not identify it: "
+            else f"the torques seem to be {shown} of what was read, but the drives do not identify it: "
             "the calibrated vehicle file keeps the torque_gain that it had"
         )
     if sum(math.isfinite(f.mass) for f in fits) > 1:

@@ -22,6 +22,7 @@ from aqualog.core.records import BoolArray, FloatArray
 __all__ = [
     "DEPTH_KEYS", "KMH", "NO_DRIVETRAIN", "ROADS", "Cell", "Group", "Picked", "Plan", "Pool", "cells",
     "check_plan", "driven_of", "free_of", "group_of", "plan", "pooled", "road_of",
+    "sort_key",
 ]  # fmt: skip
 
 KMH = 1.0 / 3.6  # [m/s]
@@ -200,7 +201,7 @@ def cells(
                 part = (info, info.index, step, {k: x[index] for k, x in found.columns.items()})
                 parts.setdefault((group_of(info.run, keys), place), []).append(part)
     out = []
-    for (group, place), pieces in sorted(parts.items(), key=lambda item: _order(item[0])):
+    for (group, place), pieces in sorted(parts.items(), key=lambda item: sort_key(item[0])):
         pool = pooled([(i, step, c) for _, i, step, c in pieces])
         infos = {info.index: info for info, *_ in pieces}
         bin_of = np.floor(pool.columns["v_x"] / KMH / plan.width_kmh) if by_speed else np.full(pool.run.size, math.nan)
@@ -224,7 +225,8 @@ def pooled(pieces: Sequence[tuple[int, NDArray[np.int64], dict[str, FloatArray]]
     return Pool(run[order], step[order], {k: np.concatenate([c[k] for *_, c in pieces])[order] for k in names})
 
 
-def _order(item: tuple[Group, str]) -> tuple[tuple[tuple[int, float, str], ...], str]:
+def sort_key(item: tuple[Group, str]) -> tuple[tuple[tuple[int, float, str], ...], str]:
+    """Return the key by which configurations and places are sorted: numbers by size, what is not stated last."""
     group, place = item
     ranked = tuple(
         (2, 0.0, "") if x is None else (0, x, "") if isinstance(x, float) else (1, 0.0, x) for _, x in group

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.campaign.bins import DEPTH_KEYS, KMH, Group, Plan, group_of
+from aqualog.campaign.bins import DEPTH_KEYS, KMH, Group, Plan, group_of, sort_key
 from aqualog.campaign.results import CampaignData
 from aqualog.campaign.slip_slope import SLOPE_MAX, SlopeRow, SlopeTable, contact
 from aqualog.campaign.spin_downs import Pass, passes
@@ -86,7 +86,7 @@ class FullSpeed:
 
 
 def full_speeds(data: CampaignData, plan: Plan, table: SlopeTable) -> tuple[FullSpeed, ...]:
-    """Speeds of all configurations with water, by all four methods.
+    """Speeds of all configurations with water, by all four methods, in order of configuration.
 
     Intervals: 2.5 and 97.5 % of 400 repetitions. From slopes: the bins' slopes and the dry one, common to all of them,
     drawn from their intervals (Student's t, so that few runs give wide intervals). Residuals of L about the curve that
@@ -114,7 +114,7 @@ def full_speeds(data: CampaignData, plan: Plan, table: SlopeTable) -> tuple[Full
     for group, members in by_group.items():
         found += [_from_passes(group, members, way, rng) for way in ("minor_spin_down", "spin_down")]
         found.append(_foretold(group, members))
-    return tuple(found)
+    return tuple(sorted(found, key=lambda f: sort_key((f.group, ""))))
 
 
 def _from_slopes(
@@ -131,8 +131,7 @@ def _from_slopes(
         return FullSpeed(*bare, rests_on=on, reason=f"a contact with an interval in {on}, at least {LEAST_BINS} needed")
     v = np.array([r.v_mean for r in told])
     L = np.array([r.contact_ratio for r in told])
-    one = np.ones(1)
-    ends = np.array([contact(r, dry, np.array(r.slope_ci), dry.slope * one) for r in told])
+    ends = np.array([contact(r, dry, np.array(r.slope_ci), np.array(dry.slope)) for r in told])
     sigma = np.maximum((ends[:, 1] - ends[:, 0]) / 4.0, SIGMA_MIN)
     on += f", {3.6 * v[0]:.0f} to {3.6 * v[-1]:.0f} km/h, contact down to {100 * L.min():.0f} %"
     best, exponent = fit_contact(v, L[None], sigma)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.campaign.bins import KMH, Group, Plan, free_of, group_of
+from aqualog.campaign.bins import KMH, Group, Plan, free_of, group_of, sort_key
 from aqualog.campaign.results import CampaignData, RunInfo
 from aqualog.core.intervals import Interval, poisson, wilson
 from aqualog.core.records import FloatArray
@@ -104,12 +104,8 @@ def minor_spin_downs(data: CampaignData, plan: Plan) -> tuple[SpinDownRow, ...]:
         number = int(p.v_mean / KMH // plan.width_kmh)
         for wheel in p.minor:
             members.setdefault((group_of(p.info.run, plan.keys), wheel, number), []).append(p)
-
-    def order(key: tuple[Group, str, int]) -> tuple[tuple[str, ...], str, int]:
-        group, wheel, number = key
-        return tuple(f"{v:012.4f}" if isinstance(v, float) else str(v) for _, v in group), wheel, number
-
-    return tuple(_row(key, members[key], plan.width_kmh) for key in sorted(members, key=order))
+    in_order = sorted(members, key=lambda key: (sort_key(key[:2]), key[2]))
+    return tuple(_row(key, members[key], plan.width_kmh) for key in in_order)
 
 
 def _row(key: tuple[Group, str, int], found: Sequence[Pass], width: float) -> SpinDownRow:

@@ -53,22 +53,24 @@ def _sums(x: FloatArray, half: int) -> FloatArray:
     return np.asarray(upto[2 * half + 1 :] - upto[: -2 * half - 1])
 
 
-def relate(x: FloatArray, y: FloatArray, step_s: float, *, least: float) -> Relation:
+def relate(x: FloatArray, y: FloatArray, step_s: float, *, least: float, blocks: int = LEAST_BLOCKS) -> Relation:
     """Correlate changes (n,) about zero; the interval is from blocks of the drive left out in turn.
 
     Parameters
     ----------
     least : float
         Root mean square that both must reach: less is the noise of sensors.
+    blocks : int
+        Least number of blocks.
     """
     good = np.isfinite(x) & np.isfinite(y)
-    if int(good.sum()) * step_s < LEAST_BLOCKS * BLOCK_S:
+    if int(good.sum()) * step_s < blocks * BLOCK_S:
         return NO_RELATION
     block = (np.flatnonzero(good) * step_s // BLOCK_S).astype(np.int64)
     _, block = np.unique(block, return_inverse=True)
     x, y = x[good], y[good]
     xx, yy, xy = (np.bincount(block, weights=p) for p in (x * x, y * y, x * y))
-    if xx.size < LEAST_BLOCKS or min(xx.sum(), yy.sum()) < least**2 * x.size:
+    if xx.size < blocks or min(xx.sum(), yy.sum()) < least**2 * x.size:
         return NO_RELATION
     r = float(xy.sum() / math.sqrt(xx.sum() * yy.sum()))
     with np.errstate(invalid="ignore", divide="ignore"):

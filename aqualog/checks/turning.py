@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from aqualog.checks.doubts import Change, Doubt
-from aqualog.checks.relations import changes, relate
+from aqualog.checks.relations import BLOCK_S, LEAST_BLOCKS, changes, relate
 from aqualog.checks.signs import LATERAL, named, witnesses
 from aqualog.checks.windows import Windows
 from aqualog.core.records import FloatArray
@@ -25,6 +25,7 @@ _OTHERS = {
     "a_y": ("course", "rear", "front", "yaw_rate"),
 }  # fmt: skip
 """Signals that are judged, and by what, the surest first."""
+SHORT_BLOCKS = 4  # of 2.5 s: on a drive shorter than 30 s a unit must explain the factor
 _DEGREE = math.pi / 180.0
 _UNITS = {
     "yaw_rate": {_DEGREE: "deg/s read as rad/s", 1.0 / _DEGREE: "rad/s read as deg/s"},
@@ -50,7 +51,8 @@ def turning_scale_doubts(windows: Windows, *, are_speeds_right: bool) -> Iterato
     # a yaw rate of many times its size is left out in all bends: its level is what is left
     levels = {n: x - np.mean(x[np.isfinite(x)]) for n, x in found.items() if np.isfinite(x).any()}
     factors = {s: f or _factors(s, levels, windows.step_s) for s, f in factors.items() if s in levels}
-    off = {s: f for s, f in factors.items() if _is_agreed(f) and (_unit(s, f)[1] or (s != "a_y" and set(f) - {"a_y"}))}
+    long = {s for s in factors if np.isfinite(seen[s]).sum() * windows.step_s >= LEAST_BLOCKS * BLOCK_S} - {"a_y"}
+    off = {s: f for s, f in factors.items() if _is_agreed(f) and (_unit(s, f)[1] or (s in long and set(f) - {"a_y"}))}
     for symbol, own in list(off.items())[:1]:  # yaw rate against a_y alone: the unit of one of them explains it
         yield _doubt(symbol, own)
 
@@ -63,7 +65,8 @@ def _factors(symbol: str, seen: Mapping[str, FloatArray], step_s: float) -> dict
     for name in _OTHERS[symbol]:
         if name not in seen or not size > 0.0:
             continue
-        relation = relate(own * (_rms(seen[name]) / size), seen[name], step_s, least=LATERAL)
+        like = own * (_rms(seen[name]) / size)
+        relation = relate(like, seen[name], step_s, least=LATERAL, blocks=SHORT_BLOCKS)
         least = LEAST_OF_WHEELS if name in ("front", "rear") else LEAST_CORRELATION
         if not relation.is_sure or abs(relation.r) < least:
             continue

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from aqualog.cli.frame import Output, Run, command
+
+if TYPE_CHECKING:
+    from aqualog.face.trade import TyreTest
 
 __all__ = ["braking", "curve", "straight", "test_app", "watch"]
 
@@ -91,7 +94,6 @@ def braking(
 
 def _test_of(run: Run, kind: str, targets: tuple[Path | None, Path | None], **options: Any) -> Output:
     """Evaluate a test; nothing is written where no run counts."""
-    from aqualog.core.errors import ExitCode
     from aqualog.face.arguments import refuse_existing
     from aqualog.face.trade import tyre_test
 
@@ -106,7 +108,13 @@ def _test_of(run: Run, kind: str, targets: tuple[Path | None, Path | None], **op
     written = [] if out is None or not found.test.entries else [str(p) for p in found.save(out, force=True)]
     if page is not None and found.test.entries:
         written.append(str(found.write_page(page, force=True)))
-    notes = [f"written: {', '.join(written)}"] if written else []
+    return _ended(run, kind, found, [f"written: {', '.join(written)}"] if written else [])
+
+
+def _ended(run: Run, kind: str, found: TyreTest, notes: list[str]) -> Output:
+    """Return the output of a test that has ended: nothing is usable where no run counts."""
+    from aqualog.core.errors import ExitCode
+
     if not found.test.valid:
         reasons = [r for e in found.test.entries for r in e.reasons] or list(found.test.failed.values())
         run.console.error(f"no {_NOUNS[kind]} of a {kind} test counts ({reasons[0] if reasons else 'no log'})")
@@ -154,4 +162,4 @@ def watch(
     notes = [f"the page is {page}"]
     if not once:
         return Output(found, notes, code=int(ExitCode.INTERRUPTED))
-    return Output(found, notes, code=None if found.test.entries else int(ExitCode.NOTHING_USABLE))
+    return _ended(run, kind, found, notes)

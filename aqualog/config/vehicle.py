@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 from aqualog.config.reader import Table, is_real, quoted, read
 from aqualog.core.errors import ConfigError
+from aqualog.core.intervals import same_decimals
 from aqualog.core.vehicle import (
     COEFFICIENTS,
     KEYS,
@@ -251,7 +252,7 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
         line = f"{key.name} = {value!r}  # [{key.unit}] {key.meaning}"
         kept = next((p for p in calibration.parameters if p.kept and p.name == key.name), None)
         if kept is not None:
-            line += f"; kept, the drives show {kept.value:.5g} ({kept.ci95[0]:.5g} ... {kept.ci95[1]:.5g})"
+            line += "; kept, the drives show {} ({} ... {})".format(*same_decimals(kept.value, kept.ci95))
         elif key.path in values:
             line += "; " + _source(values[key.path][1])
         elif key.path not in new.given:
@@ -287,8 +288,8 @@ def _drivetrain(car: Vehicle) -> str:
 def _source(p: Parameter) -> str:
     if p.remark == "given":
         return "given"
-    low, high = p.ci95
-    return f"calibrated, 95 %: {low:.5g} ... {high:.5g}" + (f" ({p.remark})" if p.remark else "")
+    _, low, high = same_decimals(p.value, p.ci95)
+    return f"calibrated, 95 %: {low} ... {high}" + (f" ({p.remark})" if p.remark else "")
 
 
 def _plain(text: str) -> str:

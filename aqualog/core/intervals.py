@@ -12,12 +12,23 @@ import numpy as np
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "NOWHERE", "Interval", "chi2_log_p", "half_width", "jackknife_sd", "poisson", "student_quantile",
+    "NOWHERE", "Interval", "chi2_log_p", "half_width", "jackknife_sd", "poisson", "same_decimals", "student_quantile",
     "variance_ratio_chance", "wilson",
 ]  # fmt: skip
 
 Interval = tuple[float, float]
 NOWHERE: Interval = (math.nan, math.nan)
+
+
+def same_decimals(value: float, ci: Interval) -> tuple[str, str, str]:
+    """Return a value and both ends of its interval in the same decimals, by the interval; empty where not finite.
+
+    Half of the interval has two digits. Without an interval five digits stand.
+    """
+    half = 0.5 * (ci[1] - ci[0])
+    form = f".{min(max(1 - math.floor(math.log10(half)), 0), 9)}f" if 0.0 < half < math.inf else ".5g"
+    shown, low, high = (f"{x:{form}}" if math.isfinite(x) else "" for x in (value, *ci))
+    return shown, low, high
 
 
 @lru_cache(maxsize=256)

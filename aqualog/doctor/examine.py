@@ -85,7 +85,7 @@ def _examined(
         what = error.what + (f"; expected {error.expected}" if error.expected else "")
         whole = Finding("doubt", "no_signals", error.where, "", what, error.hint)
         none: tuple[tuple[str, tuple[str, ...]], ...] = tuple((d, ()) for d in DETECTORS)
-        return Examination(tuple(files), (*findings, whole), (), none, tuple(pictures))
+        return Examination(tuple(files), (*findings, whole), (), none, tuple(pictures), signal_map.hint)
     frozen = {(o.file, o.channel) for o in signals.origins.values() if o.frozen}
     # what the drive leaves out as frozen need not be looked at
     findings = [f for f in findings if f.kind != "frozen" or (f.file, f.channel) not in frozen]
@@ -95,7 +95,7 @@ def _examined(
     missing = tuple((u.detector, u.missing) for u in (*result.unavailable, *result.limited))
     lacking = {u.detector for u in result.unavailable}
     ready = tuple(d for d in DETECTORS if d not in lacking)
-    return Examination(tuple(files), tuple(findings), ready, missing, tuple(pictures))
+    return Examination(tuple(files), tuple(findings), ready, missing, tuple(pictures), signal_map.hint)
 
 
 def _file(

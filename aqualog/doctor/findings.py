@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from aqualog.align.mapping import MAP_HINT
 from aqualog.core.records import FloatArray
 
 __all__ = ["Examination", "FileState", "Finding", "Level", "Picture"]
@@ -65,7 +66,8 @@ class Picture:
 class Examination:
     """Everything that was found in the files of one drive.
 
-    `missing` are signals that a detector lacks, by detector; `pictures` channels that a finding names.
+    `missing` are signals that a detector lacks, by detector; `pictures` channels that a finding names; `hint` what to
+    try where no detector can run.
     """
 
     files: tuple[FileState, ...]
@@ -73,6 +75,7 @@ class Examination:
     ready: tuple[str, ...] = ()
     missing: tuple[tuple[str, tuple[str, ...]], ...] = ()
     pictures: tuple[Picture, ...] = ()
+    hint: str = MAP_HINT
 
     @property
     def is_unreadable(self) -> bool:

@@ -10,7 +10,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.align.mapping import MAP_HINT
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.records import DriveResult, Signals
 from aqualog.core.vehicle import Vehicle
@@ -299,12 +298,10 @@ def detect(
     needs = ", ".join(n for n, is_asked in asked if is_asked)
     key = ""
     with one.reading():
-        is_mapped = bool(one.signal_map.entries)
+        hint = one.signal_map.hint
         one, loaded, guessed = load_or_guess(one, car, hear, whole_for=needs)
         if isinstance(loaded, Signals):
-            check_something_to_do(
-                loaded.symbols, 1e9 / loaded.dt_ns, loaded.quality.notes, car, one.name, is_mapped=is_mapped
-            )
+            check_something_to_do(loaded.symbols, 1e9 / loaded.dt_ns, loaded.quality.notes, car, one.name, hint)
             hear("detecting")
             past = memory
             if history is not None:
@@ -316,7 +313,7 @@ def detect(
             result = _whole(loaded, car, known, settings, past, hear, samples=samples)
         else:
             plan = loaded.drive.plan
-            check_something_to_do(plan.symbols, 1e9 / plan.grid.dt_ns, plan.notes, car, one.name, is_mapped=is_mapped)
+            check_something_to_do(plan.symbols, 1e9 / plan.grid.dt_ns, plan.notes, car, one.name, hint)
             hear.detail(f"{plan.grid.rows} samples at {1e9 / plan.grid.dt_ns:g} Hz, gone through in windows")
             out = None if windows is None else file_of(windows, "windows")
             result = _in_windows(loaded, car, settings, memory, out, hear)
@@ -435,7 +432,7 @@ def _memory(history: PathLike | None, configuration: str, reference: str) -> Mem
 
 
 def check_something_to_do(
-    symbols: Sequence[str], rate_hz: float, notes: Sequence[str], vehicle: Vehicle, name: str, *, is_mapped: bool
+    symbols: Sequence[str], rate_hz: float, notes: Sequence[str], vehicle: Vehicle, name: str, hint: str
 ) -> None:
     """Stop with one line, a SignalError, if no detector can run: what is missing, and rates of what is there."""
     from aqualog.detect.registry import DETECTORS, check_needs
@@ -451,5 +448,5 @@ def check_something_to_do(
         f"no detector can run: missing {', '.join(missing)}" + (f" ({notes[0]})" if notes else ""),
         where=name,
         expected="wheel speeds omega_fl ... omega_rr, or a_x with wheel torques",
-        hint="`aqualog inspect LOG` lists what the log has; the signal map must name these" if is_mapped else MAP_HINT,
+        hint=hint,
     )

@@ -328,6 +328,7 @@ def doctor(drive: DriveLike, vehicle: PathLike | Vehicle | None = None, *, progr
     --------
     >>> aq.doctor("drive.mf4").tables["findings"]
     """
+    from aqualog.align.mapping import MAP_HINT
     from aqualog.doctor.examine import examine
     from aqualog.doctor.findings import Finding
     from aqualog.face.guess import guessed
@@ -340,7 +341,7 @@ def doctor(drive: DriveLike, vehicle: PathLike | Vehicle | None = None, *, progr
         )  # fmt: skip
     if note:
         own = Finding("doubt", "guessed", "", "", *note.partition(". ")[::2])
-        found = replace(found, findings=(own, *found.findings))
+        found = replace(found, findings=(own, *found.findings), hint=MAP_HINT)
     return Health(one, found, has_loss=found.has_loss, sources=one.sources)
 
 

@@ -20,6 +20,7 @@ __all__ = ["PROGRAMMES", "SCENES", "Run", "scene", "situations", "thesis"]
 
 PRESSURES = {"low": 1.9e5, "medium": 2.3e5, "high": 2.8e5}  # [Pa] the thesis gives names only (K)
 APPROACH_S = 4.0  # dry road before the lane
+START_MIN = 1.0  # [m/s] a hard acceleration to a low speed begins so slowly, and has less dry road before the lane
 LANE_M = 130.0  # about 4.5 s at 100 km/h (thesis Fig. 2.25)
 RUN_OUT_S = 3.0
 LEFT_SHARE = 0.6  # the left track has significantly less water, and less even (thesis 2.1; sizes K)
@@ -178,11 +179,12 @@ def _drives() -> Iterator[_Drive]:
 def _run(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str, figures: str, seed: int) -> Run:
     v = kmh * KMH
     on_lane_s = LANE_M / v
-    duration = APPROACH_S + on_lane_s + RUN_OUT_S
+    approach = min(APPROACH_S, (v - START_MIN) / a - 0.5 * on_lane_s) if a > 0.0 else APPROACH_S
+    duration = approach + on_lane_s + RUN_OUT_S
     depth = case.depth_mm * 1e-3
-    half = APPROACH_S + 0.5 * on_lane_s  # the speed of the name is reached in the middle of the lane
+    half = approach + 0.5 * on_lane_s  # the speed of the name is reached in the middle of the lane
     speed = ((0.0, v),) if a == 0.0 else ((0.0, v - a * half), (duration, v + a * (duration - half)))
-    start = APPROACH_S * (v - a * half) + 0.5 * a * APPROACH_S**2
+    start = approach * (v - a * half) + 0.5 * a * approach**2
     lane = Lane(
         start, start + LANE_M, in_metres=True, depth_left=LEFT_SHARE * depth, depth_right=depth,
         irregularity_left=LEFT_IRREGULARITY, irregularity_right=RIGHT_IRREGULARITY,

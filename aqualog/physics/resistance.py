@@ -82,7 +82,7 @@ def nominal_acceleration(
     F_z : array (4, n)
         Wheel loads. [N]
     v_x : array (n,)
-        Velocity. [m/s]
+        Velocity, negative in reverse. [m/s]
     omega_dot : array (4, n)
         Angular accelerations of the wheels; zeros give the equation as printed. [rad/s²]
     arm, inertia : array (4,)
@@ -103,7 +103,7 @@ def nominal_acceleration(
     T = F_x r_e + r_w F_z r_e. 2.8 % between both are 0.077 m/s² at 2.35 m/s² (E24).
     """
     traction = (torque - inertia[:, None] * omega_dot) / arm[:, None]
-    rolling = rolling_resistance_force(F_z, r_w=r_w)
+    rolling = np.where(v_x < 0.0, -1.0, 1.0) * rolling_resistance_force(F_z, r_w=r_w)  # against the motion
     drag = air_drag(v_x, drag_area=drag_area, air_density=air_density)
     a_nom: FloatArray = ((traction - rolling).sum(axis=0) - drag) / mass
     return a_nom

@@ -11,6 +11,7 @@ import numpy as np
 from aqualog import __version__
 from aqualog.calibrate.records import Calibration, DriveFit, Parameter, PassFit, TieRodFit
 from aqualog.calibrate.words import left_out
+from aqualog.core.intervals import Interval, same_decimals
 from aqualog.core.records import FloatArray, Remark
 from aqualog.core.units import displayed_text
 from aqualog.report.figures import axis, dots, figure
@@ -129,7 +130,7 @@ def _pass_cells(p: PassFit) -> tuple[str, ...]:
 def parameter_cells(p: Parameter) -> tuple[str, ...]:
     """One row of the table: name, value, interval, unit, value of the vehicle file, remark."""
     why = p.remark or p.why_not
-    return p.name, _short(p.value), _interval(p.ci95), pretty_unit(p.unit), _short(p.file_value), why
+    return p.name, *_estimate(p.value, p.ci95), pretty_unit(p.unit), _short(p.file_value), why
 
 
 def _drive_cells(d: DriveFit) -> tuple[str, ...]:
@@ -144,7 +145,7 @@ def _drive_cells(d: DriveFit) -> tuple[str, ...]:
 
 def _coefficients(fit: TieRodFit) -> list[tuple[str, str, str]]:
     return [
-        (key if len(values) == 1 else f"{key}[{i}]", _short(x), _interval(fit.ci95[key][i]))
+        (key if len(values) == 1 else f"{key}[{i}]", *_estimate(x, fit.ci95[key][i]))
         for key, values in fit.coefficients.items()
         for i, x in enumerate(values)
     ]
@@ -154,11 +155,10 @@ def _short(x: float) -> str:
     return f"{x:.5g}" if math.isfinite(x) else ""
 
 
-def _interval(ci: tuple[float, float]) -> str:
-    low, high = ci
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return ""
-    return "" if low == high else f"{low:.5g} ... {high:.5g}"
+def _estimate(x: float, ci: Interval) -> tuple[str, str]:
+    """A value and its interval; empty without one."""
+    value, low, high = same_decimals(x, ci)
+    return value, f"{low} ... {high}" if low and high and low != high else ""
 
 
 def balance_residuals(c: Calibration) -> list[dict[str, Any]]:

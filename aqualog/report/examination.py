@@ -7,7 +7,6 @@ from dataclasses import asdict
 from typing import Any
 
 from aqualog import __version__
-from aqualog.align.mapping import MAP_HINT
 from aqualog.doctor.findings import Examination, Finding, Picture
 from aqualog.report.figures import axis, figure, line
 from aqualog.report.sections import Cell, Figures, Headline, Lines, Para, Report, Section, Table
@@ -50,7 +49,7 @@ def examination_report(found: Examination) -> Report:
     closing = "no problem found" if not found.findings else ""
     able = f"detectors that can run: {', '.join(found.ready)}" if found.ready else ""
     if lacks and not found.ready:
-        able = f"no detector can run\n    try: {MAP_HINT}"
+        able = f"no detector can run\n    try: {found.hint}"
     figures = _figures(found)
     sections = [
         *_page(found, lacks, figures),
@@ -104,7 +103,7 @@ def _page(found: Examination, lacks: list[tuple[str, tuple[str, ...]]], figures:
                 "pictures-section", where="page"),
         Section("Detectors", [
             Table(("Detector", "State", "Signals"), _detectors(found, dict(lacks)), "detectors", (0, 1, 2), wide=(2,)),
-            Para("" if found.ready else f"Try {MAP_HINT}."),
+            Para("" if found.ready else f"Try {found.hint}."),
         ], "detector-section", where="page"),
         Section("Files", [
             Table(("File", "Format", "Bytes", "Channels", "Samples", "Length [s]"), files, "files", (0, 1)),

@@ -100,14 +100,17 @@ def stops(
     if not np.isfinite(v).any():
         return (Stop(v_from, v_to, reasons=("v_x is not in the log: wheel speeds slip in a stop",)),)
     places = stop_between(v, v_from, v_to)
+    none = f"no stop from {3.6 * v_from:.0f} to {3.6 * v_to:.0f} km/h in the log"
     if not places:
-        what = f"no stop from {3.6 * v_from:.0f} to {3.6 * v_to:.0f} km/h in the log"
+        low, high = 3.6 * np.nanmin(v), 3.6 * np.nanmax(v)
+        what = f"{none}: v_x goes from {low:.0f} to {high:.0f} km/h; --from and --to take other speeds"
         return (Stop(v_from, v_to, reasons=(what,)),)
     found = [_stop(signals, v, p, v_from, v_to, limits, conditions or Conditions(), lane) for p in places]
     braked = [s for s in found if (v_from - v_to) / (s.end_s - s.start_s) >= limits.decel_least]
     if not braked:
-        least = max((v_from - v_to) / (s.end_s - s.start_s) for s in found)
-        what = f"no stop in the log: from {3.6 * v_from:.0f} to {3.6 * v_to:.0f} km/h it slows down by {least:.1f} m/s²"
+        a, at = max(((v_from - v_to) / (s.end_s - s.start_s), s.start_s) for s in found)
+        what = f"{none}: it slows down by {a:.1f} m/s² at most (at {at:.1f} s), "
+        what += f"a stop by {limits.decel_least:g} m/s² or more; --limits with braking.decel_least takes another value"
         return (Stop(v_from, v_to, reasons=(what,)),)
     return tuple(braked)
 

@@ -264,6 +264,10 @@ def test_minor_spin_downs_over_speed_and_the_speed_they_tell():
     assert found["minor_spin_down"].v / KMH == pytest.approx(110.0, abs=2.0)
     assert "no pass" in found["spin_down"].reason
     assert found["spin_down"].ci[1] == np.inf
+    deep_first = Made([*grid(WORN | {"water_depth_mm": 11.0}), *grid(WORN)])
+    cells = plan(deep_first, ["water-depth"])
+    found = [f.group[0][1] for f in full_speeds(deep_first, cells, slip_slopes(deep_first, cells))]
+    assert found == [1.3] * 5 + [11.0] * 5
 
 
 def test_a_short_dip_is_no_full_spin_down():

@@ -167,7 +167,10 @@ def test_ways_are_different_events_in_words():
     assert "20 ± 5" in speed.defines
     empty = type("T", (), {"rows": (), "dry": (), "delays": (), "left_out": {}, "robust": False})()
     empty.plan = type("P", (), {"keys": (), "width_kmh": 10.0})()
-    (written,) = slope_document("x", empty, [speed], [], [])["full_aquaplaning"]
+    empty.rows = (replace(row(1.0), contact_ratio=1.02, contact_ratio_ci=(0.95, 1.1)),)
+    document = slope_document("x", empty, [speed], [], [])
+    assert (document["rows"][0]["contact_ratio"], document["rows"][0]["contact_ratio_ci95"]) == (1.0, [0.95, 1.0])
+    (written,) = document["full_aquaplaning"]
     assert (written["event"], written["defines"]) == EVENTS["minor_spin_down"]
 
 

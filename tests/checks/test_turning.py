@@ -29,6 +29,15 @@ def test_a_yaw_rate_in_the_wrong_unit(seed, drop, factor, words):
     assert float(remark.lines[0].split("scale = ")[1].rstrip(" }")) == pytest.approx(1 / factor, rel=0.001)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_short_drive_shows_a_unit(seed):
+    """10 s are enough for a factor of 57, but not for one that no unit explains."""
+    drive = made(seconds=12.0, seed=seed, turning=0.1)
+    found = {f: look(signals(drive | {"yaw_rate": f * drive["yaw_rate"]}), CAR) for f in (1.0, 1 / DEGREE, 20.0)}
+    assert [r.kind for f in found for r in found[f]] == ["scale"]
+    assert "deg/s read as rad/s" in found[1 / DEGREE][0].what
+
+
 def test_the_line_has_the_right_unit():
     origin = Origin("yaw_rate", "Gyro", "a.mf4", "rad/s", 20.0, 1, mapped={"channel": ["Gyro"], "unit": "rad/s"})
     (remark,) = remarks(yaw_rate=1 / DEGREE, origins={"yaw_rate": origin})

@@ -30,7 +30,7 @@ CALLS = {
     "validate": (("short.csv", *CAR, "--no-why"), 4, "error: "),
     "evaluate": (("lane_drive.mf4",), 2, "no vehicle"),
     "test": (("straight", "lane_drive.mf4", *CAR), 4, "no side is dry beside a wet one"),
-    "watch": (("logs", "--campaign", "campaign.toml", "--once", "--every", 0.5), 0, "a.parquet: not valid: "),
+    "watch": (("logs", "--campaign", "campaign.toml", "--once", "--every", 0.5), 4, "a.parquet: not valid: "),
     "simulate": (("scenario.toml", "-o", "made.csv"), 0, "(seed 1)"),
     "figures": (("2.1", "-o", "figures"), 0, "2.1"),
     "reproduce": (("-o", "lane_drive.mf4"), 2, "is no folder"),

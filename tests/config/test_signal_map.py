@@ -41,12 +41,15 @@ def test_faults_of_a_map_come_together(tmp_path):
         assert part in str(error.value)
 
 
-@pytest.mark.parametrize("first", ['"A"', '{ channel = "A", unit = "km/h" }', '{ channel = ["A", "B"], offset = 1.0 }'])
-def test_one_channel_for_two_signals_is_refused_with_both_lines(tmp_path, first):
-    path = write(tmp_path, f'[signals]\nomega_fl = {first}\na_x = "C"\nomega_fr = {first}\n')
-    with pytest.raises(
-        ConfigError, match=r"x\.toml: line 4: omega_fr names channel \"A\", as omega_fl does in line 2"
-    ) as error:
+@pytest.mark.parametrize(
+    ("first", "other"),
+    [('"A"', '"A"'), ('{ channel = "A", unit = "km/h" }', '{ channel = "A", scale = 1.01 }'),
+     ('{ channel = ["A", "B"], offset = 1.0 }', '{ channel = ["A", "B"] }')],
+)  # fmt: skip
+def test_one_channel_for_two_signals_is_refused_with_both_lines(tmp_path, first, other):
+    path = write(tmp_path, f'[signals]\nomega_fl = {first}\na_x = "C"\nomega_fr = {other}\n')
+    told = r"x\.toml: line 4: omega_fr names channel \"A\", as omega_fl does in line 2"
+    with pytest.raises(ConfigError, match=told) as error:
         load_signal_map(path)
     assert error.value.exit_code == 2
 

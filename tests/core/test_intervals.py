@@ -5,12 +5,19 @@ import math
 import numpy as np
 import pytest
 
-from aqualog.core.intervals import jackknife_sd, poisson, student_quantile, variance_ratio_chance, wilson
+from aqualog.core.intervals import jackknife_sd, poisson, same_decimals, student_quantile, variance_ratio_chance, wilson
 
 
 def test_quantiles_of_student():
     for dof, quantile in ((1, 12.7062), (2, 4.3027), (5, 2.5706), (11, 2.2010), (100, 1.9840)):
         assert student_quantile(0.975, dof) == pytest.approx(quantile, rel=1e-4)
+
+
+def test_an_estimate_has_the_decimals_of_its_interval():
+    assert same_decimals(0.31710338, (0.317098, 0.317109)) == ("0.3171034", "0.3170980", "0.3171090")
+    assert same_decimals(1970.86, (1893.14, 2048.58)) == ("1971", "1893", "2049")
+    assert same_decimals(0.5, (0.4, 0.6)) == ("0.50", "0.40", "0.60")
+    assert same_decimals(1890.04, (math.nan, math.nan)) == ("1890", "", "")
 
 
 def test_jackknife_of_a_mean_is_its_standard_error():

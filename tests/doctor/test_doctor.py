@@ -284,6 +284,9 @@ def test_what_no_detector_can_work_with_says_what_to_try(tmp_path, capsys):
         app(["doctor", str(path)])
     out = capsys.readouterr().out
     assert "no detector can run\n    try: `aqualog init LOG -o FOLDER`" in out
+    (tmp_path / "map.toml").write_text('[signals]\nv_x = "v_x"\n')
+    mapped = run("doctor", path, "--signals", tmp_path / "map.toml").stdout
+    assert "no detector can run\n    try: `aqualog inspect LOG` lists what the log has" in mapped
     assert "resistance: missing torque of the driven wheels, vehicle.drivetrain, " in out
 
 
@@ -309,15 +312,6 @@ def test_exit_code_and_document(keep, code, tmp_path, capsys):
     assert leave.value.code == code
     assert document["healthy"] is (code == 0)
     assert {f["level"] for f in document["findings"]} >= ({"unreadable"} if code == 1 else {"lost"} if code else set())
-
-
-def test_unknown_names_say_what_to_try(tmp_path, capsys):
-    path = tmp_path / "x.csv"
-    path.write_text(table(drive(), header="t [s],a,b,c"))
-    with pytest.raises(SystemExit) as leave:
-        app(["doctor", str(path)])
-    assert leave.value.code == 4
-    assert "aqualog init LOG" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -386,6 +380,7 @@ def test_doctor_and_detect_end_with_the_same_code(change, tmp_path):
     assert codes == dict.fromkeys(codes, expected)
     document = json.loads(run("doctor", *log, "--json").stdout)
     assert document["healthy"] == (change in ("none", "no name"))
+    assert change != "no name" or "`aqualog init LOG" in document["findings"][-1]["advice"]
 
 
 def test_without_a_map_doctor_guesses_as_detect_does(tmp_path):

@@ -60,6 +60,7 @@ def test_programme_of_the_thesis():
     assert len({r.name for r in runs}) == len(runs)
     assert len({r.scenario.seed for r in runs}) == len(runs)
     assert {r.scenario.tyre_front.name for r in runs} == {"very_worn_summer", "worn_summer", "new_summer", "new_winter"}
+    assert min(v for r in runs for _, v in r.scenario.speed) > 0.0  # a car does not come backward
     assert {r.scenario.p_front for r in runs} == {1.9e5, 2.3e5, 2.8e5}
     assert {round(r.water_depth * 1e3, 1) for r in runs} >= {0.6, 0.8, 1.1, 1.2, 1.3, 2.0}
     assert {(r.scenario.load_front, r.scenario.load_rear) for r in runs} == {(0, 0), (270, 0), (0, 270)}

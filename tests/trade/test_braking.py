@@ -61,7 +61,7 @@ ODD = {
     "deep": (drive() | {"water_depth": np.full(800, 4e-3)}, "4.0 mm of water"),
     "lane too short": (drive() | {"on_water": (T < 3.0).astype(float)}, "not on water all the way"),
     "coasting": (drive(1.0, start=85.0), "no stop from 80 to 20 km/h"),
-    "never so fast": (drive(start=70.0), "no stop from 80 to 20 km/h"),
+    "never so fast": (drive(start=70.0), "no stop from 80 to 20 km/h in the log: v_x goes from 0 to 70 km/h; --from"),
     "yaw": (drive() | {"yaw_rate": np.where((T > 3.0) & (T < 3.5), 0.4, 0.0)}, "yaw rate reaches 0.40"),
     "no speed": ({"yaw_rate": np.zeros(800)}, "v_x is not in the log"),
     "all NaN": (drive() | {"v_x": np.full(800, np.nan)}, "v_x is not in the log"),
@@ -81,7 +81,7 @@ def test_rolling_out_is_no_stop():
     t = np.arange(0.0, 30.0, 0.01)
     stop = one({"v_x": np.clip(85 * KMH - 1.0 * t, 0, None), "water_depth": np.full(t.size, 1e-3)})
     assert not stop.valid
-    assert "it slows down by 1.0 m/s²" in stop.reasons[0]
+    assert "it slows down by 1.0 m/s² at most (at 1.4 s), a stop by 2 m/s² or more; --limits" in stop.reasons[0]
 
 
 def test_a_brake_that_was_let_go():

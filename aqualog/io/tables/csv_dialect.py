@@ -247,8 +247,9 @@ def _prove(
         return "a header, but no data below it"
     used = [len(_trimmed(r)) for r in body]
     long = sum(u > len(names) for u in used)
-    if long > max(1, len(body) // 100):
-        return f"{len(names)} names, but {max(used)} cells in a row"
+    if long > max(1, len(body) // 100) or long == len(body):
+        is_decimal = separator == "," and max(used) <= 2 * len(names)
+        return f"{len(names)} names, but {max(used)} cells in a row{', as decimal commas make' if is_decimal else ''}"
     if not any(len(r) >= len(names) for r in body):
         return f"{len(names)} names, but at most {max(map(len, body))} cells in a row"
     columns, unproven = _columns(names, units, body, separator, decimal)

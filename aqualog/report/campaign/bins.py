@@ -26,7 +26,7 @@ _DEFINITIONS = {
     "expected_slope": "slope of the model's regression line over mu_range",
     "contact_ratio": "share L of the contact length with which a brush model shows slope over mu_range. The brush "
     "has friction_wet and the tangent that belongs to slope_dry. At small traction L approaches "
-    "sqrt(slope / slope_dry), (2.2). Values above 1 are scatter",
+    "sqrt(slope / slope_dry), (2.2). An estimate or an end above 1 is scatter and stands as 1",
     "reliable": "estimated, with an interval whose ends are within a factor of 3, by a line that explains more than a "
     "constant",
 }  # fmt: skip
@@ -133,8 +133,8 @@ def _slope_row(r: SlopeRow) -> dict[str, Any]:
         **fields_of(r, "attenuation", "scatter", "dof", "reliable", digits=6), "reason": r.reason or None,
         "slope_dry": _number(r.slope_dry), "slope_dry_ci95": _pair(r.slope_dry_ci), "runs_dry": r.runs_dry,
         "mu_range_dry": _pair(r.mu_range_dry), "friction_dry": _number(r.friction[0]),
-        "friction_wet": _number(r.friction[1]), "contact_ratio": _number(r.contact_ratio),
-        "contact_ratio_ci95": _pair(r.contact_ratio_ci), "expected_contact_ratio": _number(r.expected.contact),
+        "friction_wet": _number(r.friction[1]), "contact_ratio": _number(min(r.contact_ratio, 1.0)),
+        "contact_ratio_ci95": _pair(_share(r.contact_ratio_ci)), "expected_contact_ratio": _number(r.expected.contact),
         "expected_slope": _number(r.expected.slope), "expected_slope_dry": _number(r.expected.slope_dry),
         "expected_reason": r.expected.reason or None,
     }  # fmt: skip
@@ -156,6 +156,11 @@ def _number(x: float) -> float | None:
     """A number with six digits; null for NaN and infinities."""
     shown: float | None = plain(float(x), 6)
     return shown
+
+
+def _share(ci: Interval) -> Interval:
+    """An interval of a share: no contact is longer than the whole one."""
+    return min(ci[0], 1.0), min(ci[1], 1.0)
 
 
 def _pair(ci: Interval) -> list[float | None] | None:
@@ -275,8 +280,8 @@ def _slope_cells(r: SlopeRow, keys: Sequence[str]) -> tuple[str, ...]:
     ratio = r.slope / r.slope_dry if r.told else math.nan
     return (
         *_values(r.group, keys), r.wheel, r.road, _kmh(r.low_kmh, r.high_kmh), str(r.runs), str(r.samples),
-        ends(r.mu_range, 2), _shown(r.slope), ends(r.slope_ci), _shown(ratio, 2), _shown(r.contact_ratio, 2),
-        ends(r.contact_ratio_ci, 2), _shown(r.expected.slope), _shown(r.expected.contact, 2),
+        ends(r.mu_range, 2), _shown(r.slope), ends(r.slope_ci), _shown(ratio, 2), _shown(min(r.contact_ratio, 1.0), 2),
+        ends(_share(r.contact_ratio_ci), 2), _shown(r.expected.slope), _shown(r.expected.contact, 2),
         _shown(100 * r.attenuation),
     )  # fmt: skip
 

@@ -38,15 +38,15 @@ function buildProblems() {
 }
 
 function speedCell(n) {
-  const [v, low, high, place, why] = n, where = place ? " " + placeName(place) : "";
+  const [v, low, high, place, why] = n, where = place ? make("small", { textContent: placeName(place) }) : null;
   if (v === null) {
     if (low === null && high === null) return make("td", { className: "num none", title: why, textContent: "–" });
-    const bound = low === null ? `< ${high.toFixed(0)}` : `> ${low.toFixed(0)}`;
-    return make("td", { className: "num none", title: `${why}; 95 %: ${bound} km/h` }, bound, make("small", { textContent: where }));
+    const bound = low === null ? `<\u00a0${high.toFixed(0)}` : `>\u00a0${low.toFixed(0)}`;
+    return make("td", { className: "num none", title: `${why}; 95 %: ${bound} km/h` }, bound, " ", where);
   }
   const ci = low === null && high === null ? "" : ` (${low === null ? "…" : low.toFixed(0)}–${high === null ? "…" : high.toFixed(0)})`;
   return make("td", { className: "num", title: why }, make("b", { textContent: v.toFixed(0) }),
-    make("small", { textContent: ci + where }));
+    make("small", { textContent: ci }), " ", where);
 }
 
 function drawAnswers() {
@@ -315,7 +315,7 @@ function fillRuns() {
     columns.forEach(function ([, kind, key, text], c) {
       if (c === 1) return line.append(make("td", { title: runs.name[i] }, link(i)));
       const shown = String((text || key)(i));
-      line.append(make("td", { className: kind, textContent: shown, title: shown.length > 40 ? shown : "" }));
+      line.append(make("td", { className: kind, textContent: shown, title: shown.length > 14 ? shown : "" }));
     });
     return line;
   }));

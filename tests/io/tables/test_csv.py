@@ -532,6 +532,7 @@ def test_a_first_line_without_an_end_is_named(read, monkeypatch):
         ("t,v\n", "one line only"),
         ("a,b,c\none,two,three\nfour,five,six\nseven,eight,nine\n", "not a table"),
         ("t,v\n0,1,2\n1,2,3\n2,3,4\n3,4,5\n", "2 names, but 3 cells"),
+        ("t,v\n0,1,2,5\n", "2 names, but 4 cells in a row, as decimal commas make"),
     ],
 )
 def test_refusals_say_what_to_do(read, text, says):

@@ -78,18 +78,42 @@ def test_filter_acts_on_figures_matrix_tables_and_count(page):
     assert len(texts(page, "#runs tbody tr")) == 15
 
 
+def changed(browser, folder, tmp_path, change):
+    """The page opened with other data."""
+    head, rest = (folder / "index.html").read_text(encoding="utf-8").split('id="campaign-data">', 1)
+    text, tail = rest.split("</script>", 1)
+    change(data := json.loads(text))
+    other = json.dumps(data).replace("<", "\\u003c")
+    (tmp_path / "index.html").write_text(f'{head}id="campaign-data">{other}</script>{tail}', encoding="utf-8")
+    (tmp_path / "plotly.min.js").write_bytes((folder / "plotly.min.js").read_bytes())
+    return opened(browser, tmp_path / "index.html")
+
+
+def test_tables_fit_a_small_screen(browser, folder, tmp_path):
+    def answer_all(data):
+        data["answers"] = [[a[0], *[[118, 109, 127, "free", "why"]] * 6] for a in data["answers"]]
+
+    before = browser.get_window_size()
+    try:
+        browser.set_window_size(1300, 2000)
+        page = changed(browser, folder, tmp_path, answer_all)
+        assert (
+            page.execute_script("""return [...document.querySelectorAll('.scroll')]
+            .filter(s => s.scrollWidth > s.clientWidth).map(s => s.firstChild.id)""")
+            == []
+        )
+    finally:
+        browser.set_window_size(before["width"], before["height"])
+
+
 def test_what_a_panel_leaves_out_is_written_on_it(browser, folder, tmp_path):
     """A value without an interval, far above all with one: the scale is theirs, and the panel says what is beyond."""
-    html = (folder / "index.html").read_text(encoding="utf-8")
-    head, rest = html.split('id="campaign-data">', 1)
-    text, tail = rest.split("</script>", 1)
-    data = json.loads(text)
-    points = next(c[2] for c in data["resistance"] if any(p[4] is not None for p in c[2]))
-    points.append([*points[-1][:3], 99.5, None, None, 1, 9, None, "one run"])
-    changed = json.dumps(data).replace("<", "\\u003c")
-    (tmp_path / "index.html").write_text(f'{head}id="campaign-data">{changed}</script>{tail}', encoding="utf-8")
-    (tmp_path / "plotly.min.js").write_bytes((folder / "plotly.min.js").read_bytes())
-    page = opened(browser, tmp_path / "index.html")
+
+    def add(data):
+        points = next(c[2] for c in data["resistance"] if any(p[4] is not None for p in c[2]))
+        points.append([*points[-1][:3], 99.5, None, None, 1, 9, None, "one run"])
+
+    page = changed(browser, folder, tmp_path, add)
     shown(page, "#resistance")
     assert any("1 value to 99.5" in t for t in texts(page, "#resistance .annotation-text"))
 
