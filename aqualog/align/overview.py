@@ -39,6 +39,7 @@ class ChannelOverview:
     remark: str = ""
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def overview(channel: Channel, *, origin_ns: int) -> ChannelOverview:
     """Summarise one channel. Times count from `origin_ns`; a gap is more than five median sample times."""
     t_ns, _, faults = ClockRepair().repair(channel.t_ns)

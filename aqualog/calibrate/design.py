@@ -27,6 +27,7 @@ LAG_MAX = 0.6  # [s] buses and GNSS receivers stay below
 FAST_S, SLOW_S = 0.2, 4.0  # [s] band in which a driver's pedal moves force and acceleration alike
 CORRELATION_MIN = 0.5  # below it the two do not move together and the lag is left at zero
 LEAST_S = 20.0  # [s]
+LEAST_CHANGE = 1e-6  # SI, of any signal: no sensor of a car resolves less
 
 
 def lag_between(x: FloatArray, y: FloatArray, dt: float) -> float:
@@ -215,7 +216,7 @@ def _check(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str) -> st
         )  # fmt: skip
     # what never changes is frozen or not connected, and would be fitted to the last digit
     speeds = [s for s in ("v_x", *(f"omega_{w}" for w in WHEELS)) if s in columns]
-    dead = [s for s in (*needed, *speeds) if float(np.nanmax(columns[s]) - np.nanmin(columns[s])) == 0.0]
+    dead = [s for s in (*needed, *speeds) if float(np.nanmax(columns[s]) - np.nanmin(columns[s])) < LEAST_CHANGE]
     if not vehicle.knows_drivetrain and not set(torques) <= set(dead):  # an axle that is not driven has no torque
         dead = [s for s in dead if s not in torques]
     if dead:

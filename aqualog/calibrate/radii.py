@@ -89,8 +89,8 @@ def fit_radii(drives: Sequence[Sequence[FloatArray]], drivetrain: Drivetrain) ->
     """
     of_drives = [np.concatenate(list(b)) for b in drives if len(b)]
     x = np.concatenate(of_drives)
-    one = np.ones(x.shape[0])
-    driven = [one, x[:, 3], x[:, 3] ** 2, x[:, 3] ** 3]
+    one, force = np.ones(x.shape[0]), x[:, 3] / max(np.abs(x[:, 3]).max(), 1e-300)  # absurd ones have no cube
+    driven = [one, force, force**2, force**3]
     if drivetrain == "awd":
         return Radii(*(_constant([*driven, x[:, 4]], x[:, i]) for i in range(3)))
     index = np.repeat(np.arange(len(of_drives)), [d.shape[0] for d in of_drives])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 
 from aqualog.guard.streams import open_streams
 
@@ -16,6 +17,9 @@ def run() -> None:
     # commands have threads and processes of their own, in which those of a product of matrices wait for each other
     for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
+    if not sys.warnoptions:  # a user has no use for what Python remarks, here or in other processes
+        os.environ["PYTHONWARNINGS"] = "ignore"
+        warnings.simplefilter("ignore")
     try:
         from aqualog.cli.main import run as begin
 

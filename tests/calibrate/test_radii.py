@@ -33,6 +33,8 @@ def test_exact_without_noise(drivetrain, limit):
     rng = np.random.default_rng(3)
     drives = [blocks(rng, drivetrain, delay=d) for d in (0.03, -0.01, 0.015)]
     found = fit_radii(drives, drivetrain)
+    with np.errstate(over="raise"):  # forces that no car has
+        assert fit_radii([[b * [1, 1, 1, 1e120, 1, 1] for b in d] for d in drives], drivetrain) == pytest.approx(found)
     front, rear = (FREE, DRIVEN) if drivetrain == "rwd" else (DRIVEN, FREE)
     assert found.r_e_f == pytest.approx(front, rel=limit)
     assert found.r_e_r == pytest.approx(rear, rel=limit)

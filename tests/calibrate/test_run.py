@@ -199,7 +199,7 @@ def test_between_drives_the_heavy_one_stands_out():
 
 
 def frozen(signals, *names):
-    value = {n: pl.Series(np.full(signals.frame.height, signals.array(n)[100])) for n in names}
+    value = {n: pl.Series(signals.array(n)[100] + np.linspace(0.0, 1e-9, signals.frame.height)) for n in names}
     return replace(signals, frame=signals.frame.with_columns(**value))
 
 

@@ -1,6 +1,8 @@
 """Each command once as installed: in a process of its own, watched, with the system's streams and exit code."""
 
 import shutil
+import subprocess
+import sys
 
 import pytest
 
@@ -54,6 +56,12 @@ def folder(tmp_path_factory):
         'name = "c"\n[[run]]\nlog = "lane_drive.mf4"\nvehicle = "vehicle.toml"\ntyre = "x"\nwater_depth_mm = 1.3\n'
     )
     return path
+
+
+def test_no_warning_of_python_reaches_a_user():
+    code = "import numpy as np, aqualog.cli.main as m, aqualog.cli.start as s; m.run = lambda: np.exp(1e3); s.run()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr == ""
 
 
 def test_every_command_is_called():

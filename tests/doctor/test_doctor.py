@@ -54,6 +54,14 @@ def test_sound_log():
     assert dict(found.missing)["tie_rod"]
 
 
+@pytest.mark.filterwarnings("error")
+def test_values_that_have_no_mean(tmp_path):
+    x = drive()
+    x[::2, 1:] = 1.7e308
+    found = kinds(tmp_path, table(x))[1]
+    assert found.files[0].samples == 9000
+
+
 def reset(x):
     x[1500:, 0] -= 14.0
     return x
