@@ -16,6 +16,7 @@ __all__ = ["scale_doubts"]
 
 LEAST_CORRELATION = 0.6
 LEAST_WINDOWS = 40
+LEAST_CHANGE = 1e-9  # [m/s^2] of a standard deviation: nothing moves
 RATIO = (
     1.8  # of accelerations: between twice the noise of such a ratio and the 2.2 of mph, the 3.6 of km/h, the 9.81 of g
 )
@@ -92,7 +93,7 @@ def _acceleration(windows: Windows, *, are_speeds_right: bool) -> Iterator[Doubt
     x, y = changes(windows["a_x"], step), changes(np.gradient(windows.speed, step), step)
     good = np.isfinite(x) & np.isfinite(y)
     x, y = x[good], y[good]
-    if x.size < LEAST_WINDOWS or not x.any() or not y.any():
+    if x.size < LEAST_WINDOWS or min(x.std(), y.std()) < LEAST_CHANGE:
         return
     r, ratio = float(np.corrcoef(x, y)[0, 1]), float(y.std() / x.std())
     # the scale lies between both regressions: noise, or grades in a_x, make one of the signals the larger one

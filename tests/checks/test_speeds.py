@@ -14,7 +14,9 @@ def said(**factors):
     return [r for r in look(signals({n: x * factors.get(n, 1.0) for n, x in DRIVE.items()}), CAR) if r.kind == "scale"]
 
 
-def test_small_differences_of_radii_are_no_fault():
+@pytest.mark.filterwarnings("error")
+def test_small_differences_of_radii_and_what_never_moves_are_no_fault():
+    assert said(a_x=1e-200) == []
     assert said(omega_fl=1.03, omega_rr=0.97, v_x=1.02) == []
 
 
