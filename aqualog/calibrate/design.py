@@ -228,14 +228,9 @@ def _check(columns: Mapping[str, FloatArray], vehicle: Vehicle, name: str) -> st
 
 
 def _reasons(
-    a_x: FloatArray,
-    v: FloatArray,
-    force: FloatArray,
-    columns: Mapping[str, FloatArray],
-    features: Mapping[str, FloatArray],
-    vehicle: Vehicle,
-    dt: float,
-) -> FloatArray:
+    a_x: FloatArray, v: FloatArray, force: FloatArray, columns: Mapping[str, FloatArray],
+    features: Mapping[str, FloatArray], vehicle: Vehicle, dt: float,
+) -> FloatArray:  # fmt: skip
     """Return 0 where a sample is used, else 1 + index into `REASONS`."""
     reason = np.zeros(v.size)
 

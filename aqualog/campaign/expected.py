@@ -167,13 +167,9 @@ def friction_of(infos: Sequence[RunInfo]) -> tuple[float, float]:
 
 
 def expected_of_runs(
-    infos: Sequence[RunInfo],
-    wheels: Sequence[str],
-    v: float,
-    *,
-    wet: bool = True,
+    infos: Sequence[RunInfo], wheels: Sequence[str], v: float, *, wet: bool = True,
     mu_range: tuple[float, float] | None = None,
-) -> Expected:
+) -> Expected:  # fmt: skip
     """Mean over runs and wheels of one cell, or the reason for none; runs of one configuration are computed once."""
     different = {(repr(i.vehicle), *(i.run.values.get(k) for k in _TOLD_BY)): i for i in infos}.values()
     all_of_them = [

@@ -51,7 +51,7 @@ def _nominal(torque, omega_dot, v=20.0):
 def test_nominal_acceleration_by_hand():
     expected = (600.0 / 0.3 - 0.01 * 1600 * G - 0.5 * 0.7 * 1.2 * 400.0) / 1600.0
     assert _nominal([0, 0, 300, 300], [0, 0, 0, 0]) == pytest.approx(expected)
-    assert _nominal([0, 0, -300, -300], [0, 0, 0, 0], v=-20.0) == pytest.approx(-expected)  # in reverse, all turns round
+    assert _nominal([0, 0, -300, -300], [0, 0, 0, 0], v=-20.0) == pytest.approx(-expected)  # in reverse
 
 
 def test_inertia_takes_its_torque():
