@@ -18,7 +18,7 @@ def run() -> None:
     for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     if not sys.warnoptions:  # a user has no use for what Python remarks, here or in other processes
-        os.environ["PYTHONWARNINGS"] = "ignore"
+        sys.warnoptions.append("ignore")
         warnings.simplefilter("ignore")
     try:
         from aqualog.cli.main import run as begin
