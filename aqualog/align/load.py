@@ -102,16 +102,10 @@ class _Request(NamedTuple):
 
 
 def load_signals(
-    paths: Sequence[Path],
-    *,
-    vehicle: Vehicle,
-    signal_map: SignalMap | None = None,
-    dbc: Sequence[Path] = (),
-    rate_hz: float | None = None,
-    wanted: Callable[[str], bool] | None = None,
-    report: Callable[[str], None] = lambda _: None,
-    cache: SignalCache | None = None,
-) -> Signals:
+    paths: Sequence[Path], *, vehicle: Vehicle, signal_map: SignalMap | None = None, dbc: Sequence[Path] = (),
+    rate_hz: float | None = None, wanted: Callable[[str], bool] | None = None,
+    report: Callable[[str], None] = lambda _: None, cache: SignalCache | None = None,
+) -> Signals:  # fmt: skip
     """Read the files of one drive and bring their signals onto one grid.
 
     Only channels that the map (or a canonical name) asks for are decoded.
@@ -191,15 +185,9 @@ def load_drive(
 
 
 def read_signals(
-    log: DriveLog,
-    found: Found,
-    *,
-    signal_map: SignalMap,
-    vehicle: Vehicle,
-    rate_hz: float | None,
-    report: Callable[[str], None],
-    dbc: Sequence[str] = (),
-) -> Signals:
+    log: DriveLog, found: Found, *, signal_map: SignalMap, vehicle: Vehicle, rate_hz: float | None,
+    report: Callable[[str], None], dbc: Sequence[str] = (),
+) -> Signals:  # fmt: skip
     """Build the table of channels that `find_channels` has found in an open log."""
     report(f"reading {len(found)} channels")
     channels = log.read(info for _, info in found.values())

@@ -111,13 +111,9 @@ OFFSET_WIDE = 0.1  # [m/s^2] half of the resistance threshold: an offset known w
 
 
 def calibrate(
-    drives: Sequence[Signals],
-    names: Sequence[str],
-    vehicle: Vehicle,
-    fixed: Mapping[str, float] | None = None,
-    *,
+    drives: Sequence[Signals], names: Sequence[str], vehicle: Vehicle, fixed: Mapping[str, float] | None = None, *,
     accept: bool = False,
-) -> Calibration:
+) -> Calibration:  # fmt: skip
     """Estimate the parameters of a car from dry drives.
 
     Parameters

@@ -134,14 +134,9 @@ def cannot_tell(parameters: Sequence[Parameter], more: Sequence[str]) -> tuple[s
 
 
 def notes(
-    fits: Sequence[DriveFit],
-    samples: Sequence[Sample],
-    found: Mapping[str, float],
-    fixed: Mapping[str, float],
-    written: Mapping[str, tuple[float, Parameter]],
-    *,
-    by_drive: bool,
-) -> list[str]:
+    fits: Sequence[DriveFit], samples: Sequence[Sample], found: Mapping[str, float], fixed: Mapping[str, float],
+    written: Mapping[str, tuple[float, Parameter]], *, by_drive: bool,
+) -> list[str]:  # fmt: skip
     """Return what a reader should know of the result; `written` are the values that the vehicle file gets, by key."""
     said = []
     alone = float(np.median([f.mass for f in fits if math.isfinite(f.mass)] or [math.nan]))

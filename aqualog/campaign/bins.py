@@ -143,16 +143,10 @@ def road_of(samples: RunSamples, road: str) -> BoolArray:
 
 
 def cells(
-    data: CampaignData,
-    plan: Plan,
-    *,
-    wheels: Callable[[RunInfo], Sequence[str]],
-    columns: Callable[[RunInfo, RunSamples, str], Picked | str],
-    road: str,
-    by_speed: bool = True,
-    keys: tuple[str, ...] | None = None,
-    only_usable: bool = True,
-) -> tuple[list[Cell], Counter[str]]:
+    data: CampaignData, plan: Plan, *, wheels: Callable[[RunInfo], Sequence[str]],
+    columns: Callable[[RunInfo, RunSamples, str], Picked | str], road: str, by_speed: bool = True,
+    keys: tuple[str, ...] | None = None, only_usable: bool = True,
+) -> tuple[list[Cell], Counter[str]]:  # fmt: skip
     """Cells of one road, in order of configuration, place and speed; and samples left out by reason.
 
     Parameters

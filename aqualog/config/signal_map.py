@@ -165,12 +165,9 @@ def _entry(signals: Table, symbol: str) -> Entry | None:
 
 
 def map_text(
-    signal_map: SignalMap,
-    *,
-    comments: Iterable[str] = (),
-    remarks: Mapping[str, str] | None = None,
+    signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Mapping[str, str] | None = None,
     unmapped: Sequence[str] = (),
-) -> str:
+) -> str:  # fmt: skip
     """Return the TOML text of a signal map; reading it again gives the same map.
 
     `comments` stand at its head, `remarks` behind the lines of their signals, `unmapped` channels at its end.

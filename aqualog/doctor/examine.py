@@ -29,13 +29,9 @@ __all__ = ["examine"]
 
 
 def examine(
-    paths: Sequence[Path],
-    *,
-    vehicle: Vehicle,
-    signal_map: SignalMap,
-    dbc: Sequence[Path] = (),
+    paths: Sequence[Path], *, vehicle: Vehicle, signal_map: SignalMap, dbc: Sequence[Path] = (),
     report: Callable[[str], None] = lambda _: None,
-) -> Examination:
+) -> Examination:  # fmt: skip
     """Examine all content of the files of one drive.
 
     Parameters

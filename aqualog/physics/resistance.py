@@ -61,18 +61,9 @@ def cornering_drag(a_y: FloatArray, *, mass: float, coefficient: float) -> Float
 
 
 def nominal_acceleration(
-    torque: FloatArray,
-    F_z: FloatArray,
-    v_x: FloatArray,
-    omega_dot: FloatArray,
-    *,
-    arm: FloatArray,
-    inertia: FloatArray,
-    mass: float,
-    r_w: float,
-    drag_area: float,
-    air_density: float,
-) -> FloatArray:
+    torque: FloatArray, F_z: FloatArray, v_x: FloatArray, omega_dot: FloatArray, *, arm: FloatArray,
+    inertia: FloatArray, mass: float, r_w: float, drag_area: float, air_density: float,
+) -> FloatArray:  # fmt: skip
     """Acceleration that the wheel torques give a car on dry road, as an accelerometer shows it.
 
     Parameters

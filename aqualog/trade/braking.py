@@ -74,14 +74,9 @@ class Stop:
 
 
 def stops(
-    signals: Signals,
-    limits: BrakingLimits | None = None,
-    *,
-    v_from: float,
-    v_to: float,
-    conditions: Conditions | None = None,
-    lane: Span | None = None,
-) -> tuple[Stop, ...]:
+    signals: Signals, limits: BrakingLimits | None = None, *, v_from: float, v_to: float,
+    conditions: Conditions | None = None, lane: Span | None = None,
+) -> tuple[Stop, ...]:  # fmt: skip
     """Evaluate every stop in a drive; without one a record that says so.
 
     Parameters

@@ -97,13 +97,9 @@ class StraightRun:
 
 
 def straight_runs(
-    signals: Signals,
-    vehicle: Vehicle,
-    limits: StraightLimits | None = None,
-    *,
-    lane: Span | None = None,
+    signals: Signals, vehicle: Vehicle, limits: StraightLimits | None = None, *, lane: Span | None = None,
     depths: tuple[float, float] | None = None,
-) -> tuple[StraightRun, ...]:
+) -> tuple[StraightRun, ...]:  # fmt: skip
     """Evaluate every run over a lane in a drive; without a lane one record that says so.
 
     Parameters
@@ -128,13 +124,9 @@ def straight_runs(
 
 
 def straight_run(
-    signals: Signals,
-    vehicle: Vehicle,
-    span: Span,
-    limits: StraightLimits | None = None,
-    *,
+    signals: Signals, vehicle: Vehicle, span: Span, limits: StraightLimits | None = None, *,
     depths: tuple[float, float] | None = None,
-) -> StraightRun:
+) -> StraightRun:  # fmt: skip
     """Evaluate the run over one lane, see `straight_runs`. Never an error: what is missing stands in `reasons`."""
     limits = limits or defaults().straight
     axle = _axle(vehicle)

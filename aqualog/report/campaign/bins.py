@@ -55,12 +55,9 @@ _UNKNOWN = "on or off the water is not known"
 
 
 def slope_document(
-    name: str,
-    slopes: SlopeTable,
-    speeds: Sequence[FullSpeed],
-    spin_ups: Sequence[tuple[MeanRow, MeanRow]],
+    name: str, slopes: SlopeTable, speeds: Sequence[FullSpeed], spin_ups: Sequence[tuple[MeanRow, MeanRow]],
     downs: Sequence[SpinDownRow],
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # fmt: skip
     """Slopes, dry references, delays of v_x, speeds of full aquaplaning, spin-ups, minor spin-downs."""
     return {
         **_head(name, slopes.plan, slopes.left_out, robust=slopes.robust),
