@@ -275,11 +275,9 @@ def test_intervals_cover_the_truth(seconds, sd, memory_s):
 
 @pytest.mark.parametrize(
     ("seconds", "max_offset_s", "cases"),
-    [
-        (60.0, 10.0, 100),
-        *(pytest.param(*x, marks=pytest.mark.nightly) for x in ((60.0, 10.0, 300), (150.0, 60.0, 200))),
-    ],
-)
+    [(60.0, 10.0, 100),
+     *(pytest.param(*x, marks=pytest.mark.nightly) for x in ((60.0, 10.0, 300), (150.0, 60.0, 200)))],
+)  # fmt: skip
 def test_unrelated_drives_are_refused(seconds, max_offset_s, cases):
     accepted = 0
     for seed in range(cases):

@@ -45,13 +45,9 @@ def test_a_code_among_thousands_is_not_the_top():
 
 @pytest.mark.parametrize(
     ("ratio", "units", "unit", "doubt"),
-    [
-        (1.0, ("m/s^2",), "m/s", ()),
-        (1 / 3.6, ("m/s^2",), "km/h", ("rad/s",)),
-        (1 / 9.80665, ("m/s^2", "g"), "m/s", ()),
-        (50.0, ("m/s^2",), None, ()),
-    ],
-)
+    [(1.0, ("m/s^2",), "m/s", ()), (1 / 3.6, ("m/s^2",), "km/h", ("rad/s",)), (1 / 9.80665, ("m/s^2", "g"), "m/s", ()),
+     (50.0, ("m/s^2",), None, ())],
+)  # fmt: skip
 def test_an_accelerometer_shows_the_unit_of_a_speed(ratio, units, unit, doubt):
     guess = by_acceleration(ratio, CHOICES["wheel"], [c for c in CHOICES["acceleration"] if c.unit in units])
     assert (guess and guess.unit, guess.doubt if guess else ()) == (unit, doubt)

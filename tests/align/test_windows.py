@@ -242,13 +242,9 @@ def test_the_shortest_drives(rows):
 
 @pytest.mark.parametrize(
     ("at", "by", "match"),
-    [
-        (1, -15_000_000, "out of order"),
-        (2500, -15_000_000, "out of order"),
-        (1, 10**5 * S, "leap"),
-        (4990, 10**5 * S, "leap"),
-    ],
-)
+    [(1, -15_000_000, "out of order"), (2500, -15_000_000, "out of order"), (1, 10**5 * S, "leap"),
+     (4990, 10**5 * S, "leap")],
+)  # fmt: skip
 def test_stamps_that_step_back_or_leap_by_a_day_need_the_whole_log(at, by, match):
     left, right = wheels()
     left.t_ns[at:] += by

@@ -146,17 +146,15 @@ def test_measured_drives_hold_no_such_run(car, test, real_logs, tmp_path):
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [
-        (("straight", LOG), "no vehicle"),
-        (("straight", "CAMPAIGN", "--control", "SRT"), 'no run has the control tyre "SRT"'),
-        (("straight", "CAMPAIGN", "--by", "tire"), 'did you mean "tyre"'),
-        (("curve", "CAMPAIGN", "--result", "most"), "min, mean, area"),
-        (("braking", "CAMPAIGN", "--from", "20", "--to", "80"), "from a higher to a lower speed"),
-        (("straight", "CAMPAIGN", "--limits", CAR), "unknown key"),
-        (("braking", "CAMPAIGN", "--coefficients", CAR), "unknown key"),
-        (("straight", "CAMPAIGN", "--csv", "table.txt"), "is no CSV"),
-    ],
-)
+    [(("straight", LOG), "no vehicle"),
+     (("straight", "CAMPAIGN", "--control", "SRT"), 'no run has the control tyre "SRT"'),
+     (("straight", "CAMPAIGN", "--by", "tire"), 'did you mean "tyre"'),
+     (("curve", "CAMPAIGN", "--result", "most"), "min, mean, area"),
+     (("braking", "CAMPAIGN", "--from", "20", "--to", "80"), "from a higher to a lower speed"),
+     (("straight", "CAMPAIGN", "--limits", CAR), "unknown key"),
+     (("braking", "CAMPAIGN", "--coefficients", CAR), "unknown key"),
+     (("straight", "CAMPAIGN", "--csv", "table.txt"), "is no CSV")],
+)  # fmt: skip
 def test_what_is_refused(campaign, arguments, words):
     done = run("test", *(campaign / "campaign.toml" if a == "CAMPAIGN" else a for a in arguments))
     assert done.exit_code == 2

@@ -128,17 +128,14 @@ c.mf4,s,999,1
 
 @pytest.mark.parametrize(
     ("text", "part"),
-    [
-        ('vehicle = "car.toml"\n', "no runs"),
-        ('vehicle = "car.toml"\nruns = "runs.csv"\n[[run]]\nlog = "a"\n', "both [[run]] and runs"),
-        ('vehicle = "car.toml"\nruns = 3\n', "runs = '3' is not a text"),
-        ('vehicle = "car.toml"\nrun = 3\n', "run is not a list"),
-        ('[[run]]\nlog = "a.mf4"\n', "no vehicle"),
-        ('vehicle = "car.toml"\nruns = "empty.csv"\n', "no run in it"),
-        ('vehicle = "car.toml"\nruns = "gone.csv"\n', "gone.csv: table of runs not found"),
-        ("run = [\n", "not valid TOML"),
-    ],
-)
+    [('vehicle = "car.toml"\n', "no runs"),
+     ('vehicle = "car.toml"\nruns = "runs.csv"\n[[run]]\nlog = "a"\n', "both [[run]] and runs"),
+     ('vehicle = "car.toml"\nruns = 3\n', "runs = '3' is not a text"),
+     ('vehicle = "car.toml"\nrun = 3\n', "run is not a list"), ('[[run]]\nlog = "a.mf4"\n', "no vehicle"),
+     ('vehicle = "car.toml"\nruns = "empty.csv"\n', "no run in it"),
+     ('vehicle = "car.toml"\nruns = "gone.csv"\n', "gone.csv: table of runs not found"),
+     ("run = [\n", "not valid TOML")],
+)  # fmt: skip
 def test_what_is_no_campaign_is_told(folder, text, part):
     (folder / "empty.csv").write_text("log,tyre\n\n")
     assert part in faults(written(folder, text))
@@ -214,19 +211,14 @@ def test_full_aquaplaning_is_partial_too(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "parts"),
-    [
-        (
-            "start_s,end_s,effect\n1,2,water\n-5,-1,water\n-5,0,water\n",
-            ("line 3: end_s = -1 is not", "line 4: end_s = 0 is"),
-        ),
-        ("start_s,end_s,effect,end_s\n1,2,water,3\n", ("line 1: column end_s stands twice",)),
-        ("start_s;end_s;effect;wheel\n1;2;water;\n", ("line 1: labels file has semicolons", "expected commas")),
-        ("1,0;2,0;water;\n", ("labels file has semicolons", "points in numbers")),
-        ("start_s\tend_s\teffect\n1\t2\twater\n", ("labels file has tabs",)),
-        ("1.0,2.0,water,\n", ("labels file has no heading; expected start_s,end_s,effect,wheel",)),
-        ("start_s,end_s,effect,wheel\n1,2,full,front\n", ('unknown wheel "front"; expected fl, fr, rl, rr',)),
-    ],
-)
+    [("start_s,end_s,effect\n1,2,water\n-5,-1,water\n-5,0,water\n", ("line 3: end_s = -1 is not", "line 4: end_s = 0 is")),
+     ("start_s,end_s,effect,end_s\n1,2,water,3\n", ("line 1: column end_s stands twice",)),
+     ("start_s;end_s;effect;wheel\n1;2;water;\n", ("line 1: labels file has semicolons", "expected commas")),
+     ("1,0;2,0;water;\n", ("labels file has semicolons", "points in numbers")),
+     ("start_s\tend_s\teffect\n1\t2\twater\n", ("labels file has tabs",)),
+     ("1.0,2.0,water,\n", ("labels file has no heading; expected start_s,end_s,effect,wheel",)),
+     ("start_s,end_s,effect,wheel\n1,2,full,front\n", ('unknown wheel "front"; expected fl, fr, rl, rr',))],
+)  # fmt: skip
 def test_faults_of_labels_are_told_once(tmp_path, text, parts):
     with pytest.raises(ConfigError) as caught:
         labels(tmp_path, text)
@@ -277,26 +269,22 @@ def test_tables_of_spreadsheets_say_the_same(folder, data):
 
 @pytest.mark.parametrize(
     ("table", "parts"),
-    [
-        ("log;pressure_rear_bar\na;1,9\nb;2.2\n", ["some numbers have a decimal comma, others a point"]),
-        ('log,load_rear_kg\na,"1,200"\n', ["some numbers have a decimal comma"]),
-        ("log,pressure_rear_bar\na,1,9\n", ["line 2: 3 cells, the heading has 2 (a decimal comma?"]),
-        ("log,pressure_rear_bar\na,1.9 bar\n", ["'1.9 bar' is not a number (in bar, without the unit)"]),
-        ("log,load_rear_kg\na,1_9\n", ["'1_9' is not a number"]),
-        ("log,load_rear_kg\na,inf\n", ["outside -5000 ... 50000 kg"]),
-        ("LOG,Tyre\na,s\n", ['unknown column "LOG" (did you mean "log"?)', 'unknown column "Tyre"', "no column log"]),
-        ("log,zzz\na,1\n", ['unknown column "zzz" (columns of your own begin with x_)']),
-        ("log,labels\na,lanes.csv\n", ['there is no such file (did you mean "lane.csv"?)']),
-        ("log,,tyre\na,1,s\n", ["line 1: column 2 has no name"]),
-        ("log,x_,tyre\na,1,s\n", ["column x_ has no name behind x_"]),
-        ("log,tyre,tyre\na,1,s\n", ["column tyre stands twice"]),
-        ('log,x_a\n"a\n.mf4",1\nb.mf4,2,3\n', ["line 2: log = ", "line 4: 3 cells"]),
-        ('log\n"a\n', ["is not CSV"]),
-        ("PK\x03\x04", ["is a spreadsheet"]),
-        ("log\n\0\n", ["is not text"]),
-        ("log,lane_start_s,lane_end_s\na,-9,-1\n", ["lane_end_s = -1 is before the log's first sample"]),
-    ],
-)
+    [("log;pressure_rear_bar\na;1,9\nb;2.2\n", ["some numbers have a decimal comma, others a point"]),
+     ('log,load_rear_kg\na,"1,200"\n', ["some numbers have a decimal comma"]),
+     ("log,pressure_rear_bar\na,1,9\n", ["line 2: 3 cells, the heading has 2 (a decimal comma?"]),
+     ("log,pressure_rear_bar\na,1.9 bar\n", ["'1.9 bar' is not a number (in bar, without the unit)"]),
+     ("log,load_rear_kg\na,1_9\n", ["'1_9' is not a number"]),
+     ("log,load_rear_kg\na,inf\n", ["outside -5000 ... 50000 kg"]),
+     ("LOG,Tyre\na,s\n", ['unknown column "LOG" (did you mean "log"?)', 'unknown column "Tyre"', "no column log"]),
+     ("log,zzz\na,1\n", ['unknown column "zzz" (columns of your own begin with x_)']),
+     ("log,labels\na,lanes.csv\n", ['there is no such file (did you mean "lane.csv"?)']),
+     ("log,,tyre\na,1,s\n", ["line 1: column 2 has no name"]),
+     ("log,x_,tyre\na,1,s\n", ["column x_ has no name behind x_"]),
+     ("log,tyre,tyre\na,1,s\n", ["column tyre stands twice"]),
+     ('log,x_a\n"a\n.mf4",1\nb.mf4,2,3\n', ["line 2: log = ", "line 4: 3 cells"]), ('log\n"a\n', ["is not CSV"]),
+     ("PK\x03\x04", ["is a spreadsheet"]), ("log\n\0\n", ["is not text"]),
+     ("log,lane_start_s,lane_end_s\na,-9,-1\n", ["lane_end_s = -1 is before the log's first sample"])],
+)  # fmt: skip
 def test_faults_of_tables(folder, table, parts):
     text = faults(written(folder, HEAD + 'runs = "runs.csv"\n', table))
     for part in parts:
@@ -334,14 +322,10 @@ def test_text_in_place_of_numbers_and_paths_of_windows(folder):
 
 @pytest.mark.parametrize(
     ("log", "part"),
-    [
-        ("*.mf4", "is a pattern; a run names its files one by one"),
-        ("@list.txt", "is a list"),
-        ("logs", "is a folder without a ROS 2 bag"),
-        ("x/a.csv;y/a.csv", "two files of one drive are both called 'a.csv'"),
-        (";", "a run names no log"),
-    ],
-)
+    [("*.mf4", "is a pattern; a run names its files one by one"), ("@list.txt", "is a list"),
+     ("logs", "is a folder without a ROS 2 bag"),
+     ("x/a.csv;y/a.csv", "two files of one drive are both called 'a.csv'"), (";", "a run names no log")],
+)  # fmt: skip
 def test_names_that_are_no_logs(folder, log, part):
     (folder / "logs").mkdir()
     assert part in faults(written(folder, HEAD + 'runs = "runs.csv"\n', f"log\n{log}\n"))

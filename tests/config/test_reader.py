@@ -57,16 +57,11 @@ def test_what_is_no_file(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "said"),
-    [
-        ('[signals]\n\na_x = { channel = "x", scale = "minus 1" }', "line 3: signals.a_x.scale = 'minus 1' is not"),
-        ('[signals]\na_x.channel = "x"\na_x.scale = [1]', "line 3: signals.a_x.scale = [1] is not a number"),
-        ('[signals.a_x]\nchannel = "x"\nscale = 1e13', "line 3: signals.a_x.scale = 1e+13 is outside"),
-        (
-            '[signals]\na_x = { channel = "x", scale = minus 1 }',
-            'line 2, column 32): a_x = { channel = "x", scale = minus',
-        ),
-    ],
-)
+    [('[signals]\n\na_x = { channel = "x", scale = "minus 1" }', "line 3: signals.a_x.scale = 'minus 1' is not"),
+     ('[signals]\na_x.channel = "x"\na_x.scale = [1]', "line 3: signals.a_x.scale = [1] is not a number"),
+     ('[signals.a_x]\nchannel = "x"\nscale = 1e13', "line 3: signals.a_x.scale = 1e+13 is outside"),
+     ('[signals]\na_x = { channel = "x", scale = minus 1 }', 'line 2, column 32): a_x = { channel = "x", scale = minus')],
+)  # fmt: skip
 def test_a_fault_has_its_line_and_its_key(tmp_path, text, said):
     (tmp_path / "m.toml").write_text(text + "\n")
     with pytest.raises(ConfigError) as error:

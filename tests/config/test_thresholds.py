@@ -37,17 +37,12 @@ def test_what_is_set_and_what_is_left(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "told"),
-    [
-        ("[thresholds]\nresistence = 0.3\n", "resistance"),
-        ("[thresholds]\nresistance = -1\n", "resistance"),
-        ("[joint_cusum]\nthrid = 'variance'\n", "third"),
-        ("[joint_cusum]\nthird = 'spin'\n", '"variance"'),
-        ("[joint_cusum]\ngated = 1\n", "true or false"),
-        ("[joint_cusum]\nweights = { resistence = 1.0 }\n", "resistance"),
-        ("[joint_cusum]\nweights = 3\n", "table"),
-        ("joint_cusum = 3\n", "not a table"),
-    ],
-)
+    [("[thresholds]\nresistence = 0.3\n", "resistance"), ("[thresholds]\nresistance = -1\n", "resistance"),
+     ("[joint_cusum]\nthrid = 'variance'\n", "third"), ("[joint_cusum]\nthird = 'spin'\n", '"variance"'),
+     ("[joint_cusum]\ngated = 1\n", "true or false"),
+     ("[joint_cusum]\nweights = { resistence = 1.0 }\n", "resistance"), ("[joint_cusum]\nweights = 3\n", "table"),
+     ("joint_cusum = 3\n", "not a table")],
+)  # fmt: skip
 def test_faults_are_told(tmp_path, text, told):
     with pytest.raises(ConfigError, match=r"thresholds\.toml") as error:
         load_settings(written(tmp_path, text))

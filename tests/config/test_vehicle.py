@@ -99,21 +99,15 @@ def vehicle_faults(tmp_path, text):
 
 @pytest.mark.parametrize(
     ("line", "said"),
-    [
-        ("c_y = [0.1, 0, 0, 0, 0, 0]", "has 6 values; expected at most 5 powers"),
-        ("c0 = 1e5", "c0 = 100000.0 is outside -10000 ... 10000"),
-        ("c0 = [1.0, 2.0]", "c0 = [1.0, 2.0] has 2 values; expected one"),
-        ("sigma = [1.0, 2.0]", "has 2 values; expected one"),
-        ("sigma = 0", "sigma = 0 is outside 0 ... 10000, 0 excluded"),
-        ("sigma = 1e300", "is outside 0 ... 10000"),
-        ("c_x = 101", "c_x = 101 is outside -100 ... 100"),
-        ("c_y = [0.1, -0.2]", "is outside -0.1 ... 0.1 in power 2"),
-        ("c_y = 1e300", "is outside -100 ... 100"),
-        ("c_y = []", "is not a number or a list of numbers"),
-        ("c_y = true", "is not a number or a list of numbers"),
-        ("c_z = 1", 'unknown key "c_z"'),
-    ],
-)
+    [("c_y = [0.1, 0, 0, 0, 0, 0]", "has 6 values; expected at most 5 powers"),
+     ("c0 = 1e5", "c0 = 100000.0 is outside -10000 ... 10000"),
+     ("c0 = [1.0, 2.0]", "c0 = [1.0, 2.0] has 2 values; expected one"),
+     ("sigma = [1.0, 2.0]", "has 2 values; expected one"),
+     ("sigma = 0", "sigma = 0 is outside 0 ... 10000, 0 excluded"), ("sigma = 1e300", "is outside 0 ... 10000"),
+     ("c_x = 101", "c_x = 101 is outside -100 ... 100"), ("c_y = [0.1, -0.2]", "is outside -0.1 ... 0.1 in power 2"),
+     ("c_y = 1e300", "is outside -100 ... 100"), ("c_y = []", "is not a number or a list of numbers"),
+     ("c_y = true", "is not a number or a list of numbers"), ("c_z = 1", 'unknown key "c_z"')],
+)  # fmt: skip
 def test_polynomials_have_bounds_and_faults_their_table_and_line(tmp_path, line, said):
     told = vehicle_faults(
         tmp_path, f"[tie_rod]\nc0 = 1.0\nc_y = 0.1\nc_x = 0.1\nsigma = 3.0\n[steering_torque]\n{line}\n"
@@ -208,30 +202,18 @@ def test_every_key_has_its_deviations_by_source():
 
 @pytest.mark.parametrize(
     ("line", "said"),
-    [
-        ('mas = "measured"', 'line 6: unknown key "mas" (did you mean "mass"?)'),
-        ('wheels.inerta_f = "guess"', 'line 6: unknown key "inerta_f" (did you mean "inertia_f"?)'),
-        ('"tyre.mu_may" = "guess"', 'line 6: unknown key "tyre.mu_may" (did you mean "tyre.mu_max"?)'),
-        ('name = "guess"', 'line 6: unknown key "name"'),
-        (
-            'mass = "weighed"',
-            "line 6: provenance.mass = 'weighed' is no source; "
-            'expected one of "measured", "calibrated", "data_sheet", "guess"',
-        ),
-        ("mass = 3", 'line 6: provenance.mass = 3 is no source; expected one of "measured"'),
-        ("mass = { sd = 3 }", "line 6: provenance.mass has no source; expected one of"),
-        ('mass = { source = "guess", sd = -3 }', "line 6: provenance.mass.sd = -3 is outside 0 ... 60000 kg"),
-        (
-            'wheels.r_e_f = { source = "guess", sd = -3 }',
-            "line 6: provenance.wheels.r_e_f.sd = -3 is outside 0 ... 1 m",
-        ),
-        ('mass = { source = "guess", std = 3 }', 'line 6: unknown key "std"'),
-        (
-            'wheels.r_e_r = "calibrated"',
-            'line 6: provenance.wheels.r_e_r = "calibrated", but the file sets no wheels.r_e_r; expected its value',
-        ),
-    ],
-)
+    [('mas = "measured"', 'line 6: unknown key "mas" (did you mean "mass"?)'),
+     ('wheels.inerta_f = "guess"', 'line 6: unknown key "inerta_f" (did you mean "inertia_f"?)'),
+     ('"tyre.mu_may" = "guess"', 'line 6: unknown key "tyre.mu_may" (did you mean "tyre.mu_max"?)'),
+     ('name = "guess"', 'line 6: unknown key "name"'),
+     ('mass = "weighed"', "line 6: provenance.mass = 'weighed' is no source; " 'expected one of "measured", "calibrated", "data_sheet", "guess"'),
+     ("mass = 3", 'line 6: provenance.mass = 3 is no source; expected one of "measured"'),
+     ("mass = { sd = 3 }", "line 6: provenance.mass has no source; expected one of"),
+     ('mass = { source = "guess", sd = -3 }', "line 6: provenance.mass.sd = -3 is outside 0 ... 60000 kg"),
+     ('wheels.r_e_f = { source = "guess", sd = -3 }', "line 6: provenance.wheels.r_e_f.sd = -3 is outside 0 ... 1 m"),
+     ('mass = { source = "guess", std = 3 }', 'line 6: unknown key "std"'),
+     ('wheels.r_e_r = "calibrated"', 'line 6: provenance.wheels.r_e_r = "calibrated", but the file sets no wheels.r_e_r; expected its value')],
+)  # fmt: skip
 def test_faults_of_the_provenance(tmp_path, line, said):
     text = f'mass = 1500.0\n[wheels]\nr_e_f = 0.3\n[provenance]\nwheels.r_e_f = "measured"\n{line}\n'
     if line.startswith("wheels.r_e_f"):
@@ -258,19 +240,14 @@ def test_known_faults_with_their_usual_place(tmp_path):
 
 @pytest.mark.parametrize(
     ("line", "fault"),
-    [
-        (
-            '"signal_dely@torque" = { delay = 0.03 }',
-            'unknown effect "signal_dely@torque" (did you mean "signal_delay"?)',
-        ),
-        ('"signal_delay@moon" = { delay = 0.03 }', "signal_delay cannot sit at moon"),
-        ('"signal_delay@torque" = { delay = 30.0 }', "known.signal_delay@torque.delay = 30 is outside -1 ... 2 s"),
-        ('"signal_delay@torque" = { spread = 0.1 }', "has no value; expected { delay = ..., spread = ... }"),
-        ('"signal_delay@torque" = 0.03', "has no value; expected { delay = ..., spread = ... }"),
-        ('"signal_delay@torque" = { delay = 0.03, sd = 1.0 }', 'unknown key "sd"'),
-        ('"signal_delay@torque" = { delay = 0.03, spread = -1.0 }', "spread = -1 is outside 0 ... 3 s"),
-    ],
-)
+    [('"signal_dely@torque" = { delay = 0.03 }', 'unknown effect "signal_dely@torque" (did you mean "signal_delay"?)'),
+     ('"signal_delay@moon" = { delay = 0.03 }', "signal_delay cannot sit at moon"),
+     ('"signal_delay@torque" = { delay = 30.0 }', "known.signal_delay@torque.delay = 30 is outside -1 ... 2 s"),
+     ('"signal_delay@torque" = { spread = 0.1 }', "has no value; expected { delay = ..., spread = ... }"),
+     ('"signal_delay@torque" = 0.03', "has no value; expected { delay = ..., spread = ... }"),
+     ('"signal_delay@torque" = { delay = 0.03, sd = 1.0 }', 'unknown key "sd"'),
+     ('"signal_delay@torque" = { delay = 0.03, spread = -1.0 }', "spread = -1 is outside 0 ... 3 s")],
+)  # fmt: skip
 def test_a_fault_in_known_names_line_and_what_was_expected(tmp_path, line, fault):
     with pytest.raises(ConfigError) as error:
         loaded(tmp_path, f"mass = 1500.0\n[known]\n{line}\n")

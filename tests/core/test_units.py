@@ -8,27 +8,13 @@ from aqualog.core.units import convert, displayed_units, is_unit, parse_unit
 
 @pytest.mark.parametrize(
     ("value", "source", "target", "expected"),
-    [
-        (36.0, "km/h", "m/s", 10.0),
-        (100.0, "kph", "m/s", 27.7777777778),
-        (1.0, "g", "m/s^2", 9.80665),
-        (1.0, "G", "m/s^2", 9.80665),
-        (180.0, "deg", "rad", np.pi),
-        (60.0, "rpm", "rad/s", 2 * np.pi),
-        (60.0, "U/min", "rad/s", 2 * np.pi),
-        (90.0, "°/s", "rad/s", np.pi / 2),
-        (2.0, "bar", "Pa", 2e5),
-        (25.0, "°C", "K", 298.15),
-        (32.0, "degF", "K", 273.15),
-        (1.3, "mm", "m", 1.3e-3),
-        (50.0, "%", "-", 0.5),
-        (2.0, "kNm", "N*m", 2000.0),
-        (3.0, "Nm", "N*m", 3.0),
-        (30.0, "psi", "Pa", 206842.7),
-        (5.0, "ms", "s", 5e-3),
-        (7.0, "kN", "N", 7000.0),
-    ],
-)
+    [(36.0, "km/h", "m/s", 10.0), (100.0, "kph", "m/s", 27.7777777778), (1.0, "g", "m/s^2", 9.80665),
+     (1.0, "G", "m/s^2", 9.80665), (180.0, "deg", "rad", np.pi), (60.0, "rpm", "rad/s", 2 * np.pi),
+     (60.0, "U/min", "rad/s", 2 * np.pi), (90.0, "°/s", "rad/s", np.pi / 2), (2.0, "bar", "Pa", 2e5),
+     (25.0, "°C", "K", 298.15), (32.0, "degF", "K", 273.15), (1.3, "mm", "m", 1.3e-3), (50.0, "%", "-", 0.5),
+     (2.0, "kNm", "N*m", 2000.0), (3.0, "Nm", "N*m", 3.0), (30.0, "psi", "Pa", 206842.7), (5.0, "ms", "s", 5e-3),
+     (7.0, "kN", "N", 7000.0)],
+)  # fmt: skip
 def test_conversion(value, source, target, expected):
     assert convert(np.array([value]), source, target)[0] == pytest.approx(expected, rel=1e-7)
 

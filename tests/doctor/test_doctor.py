@@ -90,14 +90,12 @@ def pause(x):
 
 @pytest.mark.parametrize(
     ("change", "expected", "told"),
-    [
-        (reset, ("mended", "resets"), "1 resets of the clock (first at 14.99 s); what follows is put"),
-        (wrapped, ("mended", "wraps"), "1 overflows of the time counter (first at 11.99 s); undone"),
-        (doubled, ("lost", "duplicates"), "99 time stamps doubled (first at 1.00 s); the last sample"),
-        (swapped, ("mended", "back_steps"), "1 time stamps out of order (first at 7.01 s); samples are sorted"),
-        (pause, ("doubt", "pauses"), "1 pauses of the recording (first at 19.99 s); nothing is judged"),
-    ],
-)
+    [(reset, ("mended", "resets"), "1 resets of the clock (first at 14.99 s); what follows is put"),
+     (wrapped, ("mended", "wraps"), "1 overflows of the time counter (first at 11.99 s); undone"),
+     (doubled, ("lost", "duplicates"), "99 time stamps doubled (first at 1.00 s); the last sample"),
+     (swapped, ("mended", "back_steps"), "1 time stamps out of order (first at 7.01 s); samples are sorted"),
+     (pause, ("doubt", "pauses"), "1 pauses of the recording (first at 19.99 s); nothing is judged")],
+)  # fmt: skip
 def test_time_faults(change, expected, told, tmp_path):
     found, _ = kinds(tmp_path, table(change(drive())))
     assert expected in found

@@ -145,13 +145,9 @@ def test_another_sample_rate_on_its_own_clock(folder, tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "told"),
-    [
-        ("exact", "is no rival; expected NAME=CHANNEL"),
-        ("spin_down=x", '"spin_down" is a detector of aqualog'),
-        ("a=x>=high", '"high" is no number'),
-        ("1a=x", "is no rival"),
-    ],
-)
+    [("exact", "is no rival; expected NAME=CHANNEL"), ("spin_down=x", '"spin_down" is a detector of aqualog'),
+     ("a=x>=high", '"high" is no number'), ("1a=x", "is no rival")],
+)  # fmt: skip
 def test_forms(text, told):
     with pytest.raises(ConfigError) as caught:
         parse_rivals([text])

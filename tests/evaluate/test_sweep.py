@@ -58,11 +58,9 @@ def values(all_groups, indices, key):
 
 @pytest.mark.parametrize(
     ("given", "unused"),
-    [
-        (groups(("a", "x"), ("a", "y"), ("b", "z"), ("b", "z")), 0),
-        (groups(*((v, t) for v in "abcd" for t in "xyz")), 6),
-    ],
-)
+    [(groups(("a", "x"), ("a", "y"), ("b", "z"), ("b", "z")), 0),
+     (groups(*((v, t) for v in "abcd" for t in "xyz")), 6)],
+)  # fmt: skip
 def test_no_vehicle_and_no_tyre_is_in_both_parts(given, unused):
     s = split_runs(given)
     assert s.tuning

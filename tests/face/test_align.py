@@ -77,12 +77,9 @@ def test_a_drive_and_named_channels(folder):
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
-    [
-        ({"quantity": "noise"}, "speed or yaw_rate"),
-        ({"channels": {"x.csv": "a"}}, "FILE one of"),
-        ({"max_offset_s": 0.0}, "max_offset_s"),
-    ],
-)
+    [({"quantity": "noise"}, "speed or yaw_rate"), ({"channels": {"x.csv": "a"}}, "FILE one of"),
+     ({"max_offset_s": 0.0}, "max_offset_s")],
+)  # fmt: skip
 def test_wrong_arguments(folder, arguments, said):
     with pytest.raises(aq.AqualogError, match=said):
         aq.align(folder / "wheels.csv", folder / "gps.csv", **arguments)

@@ -89,23 +89,21 @@ def test_a_file_of_the_readers_that_cannot_be_named():
 
 @pytest.mark.parametrize(
     ("call", "match"),
-    [
-        (lambda: aq.read(LOG, rate_hz="100"), "rate_hz: expected a number, not str"),
-        (lambda: aq.align(LOG, LOG, max_offset_s=None), "max_offset_s: expected a number"),
-        (lambda: aq.align(LOG, LOG, channels=5), "channels: expected a mapping"),
-        (lambda: aq.align(LOG, LOG, quantity=5), "quantity: expected a text"),
-        (lambda: aq.detect(LOG, CAR, reference=None), "reference: expected a text"),
-        (lambda: aq.detect(LOG, CAR, configuration=b"a"), "configuration: expected a text"),
-        (lambda: aq.diagnose(LOG, CAR, level="a"), "level: expected a number"),
-        (lambda: aq.diagnose(LOG, CAR, seed=1.5), "seed: expected a whole number, not float"),
-        (lambda: aq.diagnose(LOG, CAR, surrogates="9"), "surrogates: expected a whole number, not str"),
-        (lambda: aq.calibrate(LOG, CAR, fix="mass=3"), "fix: expected a mapping"),
-        (lambda: aq.calibrate(LOG, CAR, fix={"mass": "3"}), "fix mass: expected a number, not str"),
-        (lambda: aq.slip_slope(LOG, CAR, mu_max="a"), "mu_max: expected a number"),
-        (lambda: aq.slip_slope(LOG, CAR, method=None), "method: expected a text"),
-        (lambda: aq.simulate(SAMPLES / "scenario.toml", seed="a"), "seed: expected a whole number"),
-    ],
-)
+    [(lambda: aq.read(LOG, rate_hz="100"), "rate_hz: expected a number, not str"),
+     (lambda: aq.align(LOG, LOG, max_offset_s=None), "max_offset_s: expected a number"),
+     (lambda: aq.align(LOG, LOG, channels=5), "channels: expected a mapping"),
+     (lambda: aq.align(LOG, LOG, quantity=5), "quantity: expected a text"),
+     (lambda: aq.detect(LOG, CAR, reference=None), "reference: expected a text"),
+     (lambda: aq.detect(LOG, CAR, configuration=b"a"), "configuration: expected a text"),
+     (lambda: aq.diagnose(LOG, CAR, level="a"), "level: expected a number"),
+     (lambda: aq.diagnose(LOG, CAR, seed=1.5), "seed: expected a whole number, not float"),
+     (lambda: aq.diagnose(LOG, CAR, surrogates="9"), "surrogates: expected a whole number, not str"),
+     (lambda: aq.calibrate(LOG, CAR, fix="mass=3"), "fix: expected a mapping"),
+     (lambda: aq.calibrate(LOG, CAR, fix={"mass": "3"}), "fix mass: expected a number, not str"),
+     (lambda: aq.slip_slope(LOG, CAR, mu_max="a"), "mu_max: expected a number"),
+     (lambda: aq.slip_slope(LOG, CAR, method=None), "method: expected a text"),
+     (lambda: aq.simulate(SAMPLES / "scenario.toml", seed="a"), "seed: expected a whole number")],
+)  # fmt: skip
 def test_values_of_a_wrong_type(call, match):
     with pytest.raises(TypeError, match=match):
         call()
@@ -228,18 +226,13 @@ def campaign(tmp_path_factory):
 
 @pytest.mark.parametrize(
     ("options", "kind", "match"),
-    [
-        ({"jobs": 0}, aq.AqualogError, "jobs = 0; expected 1 to 1024"),
-        ({"jobs": "a"}, TypeError, "jobs: expected a whole number, not str"),
-        ({"jobs": 1.5}, TypeError, "jobs: expected a whole number, not float"),
-        ({"limit_s": -1}, aq.AqualogError, "limit_s = -1"),
-        ({"limit_s": "a"}, TypeError, "limit_s: expected a number"),
-        ({"limit_mb": 1}, aq.AqualogError, "limit_mb = 1"),
-        ({"shard": 3}, TypeError, "shard: expected a text"),
-        ({"shard": "9/3"}, aq.AqualogError, "^shard 9/3"),
-        ({"cluster": ""}, aq.AqualogError, "^cluster is empty"),
-    ],
-)
+    [({"jobs": 0}, aq.AqualogError, "jobs = 0; expected 1 to 1024"),
+     ({"jobs": "a"}, TypeError, "jobs: expected a whole number, not str"),
+     ({"jobs": 1.5}, TypeError, "jobs: expected a whole number, not float"),
+     ({"limit_s": -1}, aq.AqualogError, "limit_s = -1"), ({"limit_s": "a"}, TypeError, "limit_s: expected a number"),
+     ({"limit_mb": 1}, aq.AqualogError, "limit_mb = 1"), ({"shard": 3}, TypeError, "shard: expected a text"),
+     ({"shard": "9/3"}, aq.AqualogError, "^shard 9/3"), ({"cluster": ""}, aq.AqualogError, "^cluster is empty")],
+)  # fmt: skip
 def test_runs_of_a_campaign(campaign, options, kind, match):
     with pytest.raises(kind, match=match):
         campaign.run(**options)
@@ -247,14 +240,12 @@ def test_runs_of_a_campaign(campaign, options, kind, match):
 
 @pytest.mark.parametrize(
     ("options", "kind", "match"),
-    [
-        ({"by": 5}, TypeError, "by: expected"),
-        ({"by": "colour"}, aq.AqualogError, "^by .*no run has this key; expected vehicle, tyre"),
-        ({"bin_width": "a"}, TypeError, "bin_width: expected a number"),
-        ({"bin_width": float("nan")}, aq.AqualogError, "bin_width = nan; expected 1 to 100 km/h"),
-        ({"road": "x"}, aq.AqualogError, "^road "),
-    ],
-)
+    [({"by": 5}, TypeError, "by: expected"),
+     ({"by": "colour"}, aq.AqualogError, "^by .*no run has this key; expected vehicle, tyre"),
+     ({"bin_width": "a"}, TypeError, "bin_width: expected a number"),
+     ({"bin_width": float("nan")}, aq.AqualogError, "bin_width = nan; expected 1 to 100 km/h"),
+     ({"road": "x"}, aq.AqualogError, "^road ")],
+)  # fmt: skip
 def test_bins_of_a_campaign(campaign, options, kind, match):
     with pytest.raises(kind, match=match):
         campaign.check_bins(**options)

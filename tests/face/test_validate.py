@@ -81,15 +81,12 @@ def test_boundaries_of_the_user(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "told"),
-    [
-        ('[[plot]]\ny = "a_z"\ny_offset = 1.0', "line 2: y = 'a_z' is not one of \"a_x\""),
-        ('[[plot]]\ny = "a_x"', "plot a_x over t: neither y_offset nor y_gain is above 0"),
-        ('[[plot]]\ny = "a_x"\ny_ofset = 1.0', 'unknown key "y_ofset" (did you mean "y_offset"?)'),
-        ('[[plot]]\ny = "a_x"\ny_offset = 1\n[[plot]]\ny = "a_x"\ny_offset = 2', "a_x over t stands twice"),
-        ("built_in = false", "leaves no plot"),
-        ("agreed = 2", "agreed = 2 is outside 0.5 ... 1"),
-    ],
-)
+    [('[[plot]]\ny = "a_z"\ny_offset = 1.0', "line 2: y = 'a_z' is not one of \"a_x\""),
+     ('[[plot]]\ny = "a_x"', "plot a_x over t: neither y_offset nor y_gain is above 0"),
+     ('[[plot]]\ny = "a_x"\ny_ofset = 1.0', 'unknown key "y_ofset" (did you mean "y_offset"?)'),
+     ('[[plot]]\ny = "a_x"\ny_offset = 1\n[[plot]]\ny = "a_x"\ny_offset = 2', "a_x over t stands twice"),
+     ("built_in = false", "leaves no plot"), ("agreed = 2", "agreed = 2 is outside 0.5 ... 1")],
+)  # fmt: skip
 def test_faults_of_the_boundaries_file(tmp_path, text, told):
     (tmp_path / "own.toml").write_text(text)
     with pytest.raises(aq.AqualogError) as caught:

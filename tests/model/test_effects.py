@@ -100,18 +100,13 @@ def test_model_file_reads_back(tmp_path):
 
 @pytest.mark.parametrize(
     ("knots", "said"),
-    [
-        ("3", "line 4: knots = 3 is not a list of pairs"),
-        ("[]", "is not a list of pairs"),
-        ("[[1.0, 2.0, 3.0], [2.0, 1.0]]", "is not a list of pairs"),
-        ('[[1.0, "a"], [2.0, 1.0]]', "is not a list of pairs"),
-        ("[[1.0, nan], [2.0, 1.0]]", "is not a list of pairs"),
-        ("[[1.0, 2.0]]", "1 knots, at least 2"),
-        ("[[2.0, 1.0], [1.0, 1.0]]", "do not rise in v_x"),
-        ("[[-2.0, 1.0], [1.0, 1.0]]", "a knot at -2 is outside 0 ... 150 m/s"),
-        ("[[2.0, 1.0], [3.0, 1e6]]", "a value of 1e+06 is outside"),
-    ],
-)
+    [("3", "line 4: knots = 3 is not a list of pairs"), ("[]", "is not a list of pairs"),
+     ("[[1.0, 2.0, 3.0], [2.0, 1.0]]", "is not a list of pairs"),
+     ('[[1.0, "a"], [2.0, 1.0]]', "is not a list of pairs"), ("[[1.0, nan], [2.0, 1.0]]", "is not a list of pairs"),
+     ("[[1.0, 2.0]]", "1 knots, at least 2"), ("[[2.0, 1.0], [1.0, 1.0]]", "do not rise in v_x"),
+     ("[[-2.0, 1.0], [1.0, 1.0]]", "a knot at -2 is outside 0 ... 150 m/s"),
+     ("[[2.0, 1.0], [3.0, 1e6]]", "a value of 1e+06 is outside")],
+)  # fmt: skip
 def test_faulty_knots_are_told(tmp_path, knots, said):
     path = tmp_path / "model.toml"
     path.write_text(f'# a model\n[[term]]\neffect = "unexplained_force"\nknots = {knots}\n', encoding="utf-8")

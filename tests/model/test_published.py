@@ -41,22 +41,13 @@ def test_every_point_names_a_source_that_is_registered():
 
 @pytest.mark.parametrize(
     ("changed", "says"),
-    [
-        ({"source": None}, "point thesis-1.3: source is missing"),
-        ({"depht": 1.3}, "unknown key depht"),
-        ({"depth": "1.3"}, "depth = '1.3' is no number"),
-        ({"pressure": 190.0}, "pressure = 190 is out of bounds"),
-        ({"mark": "X"}, 'mark = "X"'),
-        ({"low": 130}, "low 130, high 118"),
-        ({"tolerance": 0}, "tolerance 0"),
-        ({"criterion": "floats"}, 'criterion "floats"'),
-        ({"speed": 90}, "speed is given"),
-        ({"quantity": "drag", "criterion": ""}, "speed is missing"),
-        ({"over": {"depth": 1.0}}, "over"),
-        ({"assumed": ["colour"]}, "assumed colour"),
-        ({"id": "thesis-0.8"}, "points of the same id: thesis-0.8"),
-    ],
-)
+    [({"source": None}, "point thesis-1.3: source is missing"), ({"depht": 1.3}, "unknown key depht"),
+     ({"depth": "1.3"}, "depth = '1.3' is no number"), ({"pressure": 190.0}, "pressure = 190 is out of bounds"),
+     ({"mark": "X"}, 'mark = "X"'), ({"low": 130}, "low 130, high 118"), ({"tolerance": 0}, "tolerance 0"),
+     ({"criterion": "floats"}, 'criterion "floats"'), ({"speed": 90}, "speed is given"),
+     ({"quantity": "drag", "criterion": ""}, "speed is missing"), ({"over": {"depth": 1.0}}, "over"),
+     ({"assumed": ["colour"]}, "assumed colour"), ({"id": "thesis-0.8"}, "points of the same id: thesis-0.8")],
+)  # fmt: skip
 def test_a_fault_of_the_file_names_point_and_key(changed, says):
     with pytest.raises(ConfigError) as error:
         published.read(first(**changed))

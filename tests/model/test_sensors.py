@@ -235,14 +235,10 @@ def test_the_same_seed_gives_the_same_noise_in_another_process():
 
 @pytest.mark.parametrize(
     ("signal", "change"),
-    [
-        ("a_x", {"noise": 0.5}),
-        ("a_x", {"noise": 0.0, "offset_spread": 0.0, "drift_spread": 0.0}),
-        ("a_x", {"bias": 0.3, "delay_s": 0.04, "gain": 1.1}),
-        ("omega_fl", {"noise": 0.1, "delay_s": 0.04, "lag_s": 0.02}),
-        ("torque_rl", {"gain_spread": 0.2}),
-    ],
-)
+    [("a_x", {"noise": 0.5}), ("a_x", {"noise": 0.0, "offset_spread": 0.0, "drift_spread": 0.0}),
+     ("a_x", {"bias": 0.3, "delay_s": 0.04, "gain": 1.1}),
+     ("omega_fl", {"noise": 0.1, "delay_s": 0.04, "lag_s": 0.02}), ("torque_rl", {"gain_spread": 0.2})],
+)  # fmt: skip
 def test_a_change_at_one_signal_leaves_all_others_to_the_bit(signal, change):
     truth = everything()
     before = seen(truth, ESC)

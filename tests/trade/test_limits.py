@@ -31,15 +31,11 @@ def test_file_of_a_user(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [
-        ("[straight]\nyaw_rte = 0.08\n", 'unknown key "yaw_rte" \\(did you mean "yaw_rate"'),
-        ("[strait]\nslip = 0.1\n", 'did you mean "straight"'),
-        ("[straight]\nslip = 9.0\n", "slip = 9 is outside 0.02 ... 1"),
-        ('[straight]\nslip = "0.1"\n', "line 2"),
-        ("[braking]\ndepth_low = 3.0\n", "depth_low is above"),
-        ("straight = 3\n", "straight is not a table"),
-    ],
-)
+    [("[straight]\nyaw_rte = 0.08\n", 'unknown key "yaw_rte" \\(did you mean "yaw_rate"'),
+     ("[strait]\nslip = 0.1\n", 'did you mean "straight"'),
+     ("[straight]\nslip = 9.0\n", "slip = 9 is outside 0.02 ... 1"), ('[straight]\nslip = "0.1"\n', "line 2"),
+     ("[braking]\ndepth_low = 3.0\n", "depth_low is above"), ("straight = 3\n", "straight is not a table")],
+)  # fmt: skip
 def test_wrong_file_of_a_user(tmp_path, text, words):
     path = tmp_path / "limits.toml"
     path.write_text(text)

@@ -55,14 +55,9 @@ def test_upper_tail():
 
 @pytest.mark.parametrize(
     ("values", "bounds", "mean"),
-    [
-        ([], [], None),
-        ([80.0], [], 80.0),
-        ([80.0], [85.0], None),
-        ([80.0, 80.0], [], 80.0),
-        ([80.0, 80.0], [79.0], 80.0),
-    ],
-)
+    [([], [], None), ([80.0], [], 80.0), ([80.0], [85.0], None), ([80.0, 80.0], [], 80.0),
+     ([80.0, 80.0], [79.0], 80.0)],
+)  # fmt: skip
 def test_too_little_for_an_interval_is_no_error(values, bounds, mean):
     found = censored_mean(np.array(values), np.array(bounds))
     assert (None if math.isnan(found.mean) else found.mean) == mean

@@ -241,12 +241,10 @@ def test_pieces_of_our_own_file_begin_when_it_does(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("column", "t_ns"),
-    [
-        (pl.Series([2**63, 5, 6], dtype=pl.UInt64), [5 * 10**9, 6 * 10**9]),
-        (pl.Series([2**62, 5, 6], dtype=pl.Int64).cast(pl.Datetime("ms")), [5 * 10**6, 6 * 10**6]),
-        (pl.Series([-(2**62), 5, 6], dtype=pl.Int64).cast(pl.Duration("us")), [5000, 6000]),
-    ],
-)
+    [(pl.Series([2**63, 5, 6], dtype=pl.UInt64), [5 * 10**9, 6 * 10**9]),
+     (pl.Series([2**62, 5, 6], dtype=pl.Int64).cast(pl.Datetime("ms")), [5 * 10**6, 6 * 10**6]),
+     (pl.Series([-(2**62), 5, 6], dtype=pl.Int64).cast(pl.Duration("us")), [5000, 6000])],
+)  # fmt: skip
 def test_times_beyond_what_nanoseconds_hold_cost_their_row(tmp_path, column, t_ns):
     path = tmp_path / "a.parquet"
     name = "t [s]" if column.dtype == pl.UInt64 else "t"
