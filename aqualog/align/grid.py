@@ -74,14 +74,9 @@ def placed(t_ns: TimeArray, grid_ns: TimeArray, dt_ns: int | None = None) -> Pla
 
 
 def linear(
-    t_ns: TimeArray,
-    x: FloatArray,
-    grid_ns: TimeArray,
-    *,
-    gap_ns: int,
-    period_ns: int | None = None,
+    t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, period_ns: int | None = None,
     at: Placed | None = None,
-) -> tuple[FloatArray, BoolArray]:
+) -> tuple[FloatArray, BoolArray]:  # fmt: skip
     """Interpolate finite samples (n,) at strictly increasing stamps (n,) linearly to points (m,). [ns]
 
     Intervals up to `gap_ns` are bridged. `period_ns`: median sample time, default that of the stamps; `at`: positions
@@ -121,15 +116,9 @@ def hold(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, at:
 
 
 def bin_mean(
-    t_ns: TimeArray,
-    x: FloatArray,
-    grid_ns: TimeArray,
-    *,
-    dt_ns: int,
-    gap_ns: int,
-    period_ns: int | None = None,
+    t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, dt_ns: int, gap_ns: int, period_ns: int | None = None,
     at: Placed | None = None,
-) -> tuple[FloatArray, BoolArray]:
+) -> tuple[FloatArray, BoolArray]:  # fmt: skip
     """Average the samples within half a grid step on either side, for signals much faster than the grid.
 
     Plain interpolation would alias their noise into the grid. Where a bin is empty, linear interpolation takes over.
@@ -174,12 +163,9 @@ class Grid(NamedTuple):
 
 
 def common_clock(
-    clocks: Sequence[tuple[str, bool]],
-    signal_map: SignalMap,
-    *,
-    with_speed: Collection[str] = (),
+    clocks: Sequence[tuple[str, bool]], signal_map: SignalMap, *, with_speed: Collection[str] = (),
     dbc: Sequence[str] = (),
-) -> bool:
+) -> bool:  # fmt: skip
     """Return whether the drive has absolute time; refuse to join clocks that have nothing in common.
 
     `clocks` holds the file of each signal and whether its time is absolute. A file whose offset the map gives is

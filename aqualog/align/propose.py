@@ -401,12 +401,9 @@ def _as_beside(p: Proposal, other: Proposal | None, channels: _Named) -> Proposa
 
 
 def _settle_speeds(
-    found: dict[str, Proposal],
-    channels: _Named,
-    raw: Mapping[str, FloatArray],
-    grid: TimeArray,
+    found: dict[str, Proposal], channels: _Named, raw: Mapping[str, FloatArray], grid: TimeArray,
     course: FloatArray | None,
-) -> None:
+) -> None:  # fmt: skip
     """Give a unit to each speed that has none: by one that is known, else by an accelerometer or by its range."""
 
     def is_bare(symbol: str) -> bool:

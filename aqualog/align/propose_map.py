@@ -77,12 +77,9 @@ def measures_wheels(log: LogFile, options: ReadOptions | None = None) -> bool:
 
 
 def propose_signals(
-    drives: Sequence[Sequence[LogFile]],
-    options: ReadOptions | None = None,
-    report: Callable[[str], None] = lambda _: None,
-    *,
-    most_missing: float = MOST_MISSING,
-) -> MapProposal:
+    drives: Sequence[Sequence[LogFile]], options: ReadOptions | None = None,
+    report: Callable[[str], None] = lambda _: None, *, most_missing: float = MOST_MISSING,
+) -> MapProposal:  # fmt: skip
     """Propose the map, from the data of up to two drives of each set of channels.
 
     Parameters
@@ -137,12 +134,9 @@ def _proposals(files: _Files, options: ReadOptions | None) -> tuple[dict[str, Pr
 
 
 def _joined(
-    proposed: Sequence[dict[str, Proposal]],
-    drives: Sequence[_Files],
-    kinds: _Kinds,
-    most_missing: float,
+    proposed: Sequence[dict[str, Proposal]], drives: Sequence[_Files], kinds: _Kinds, most_missing: float,
     notes: list[str],
-) -> MapProposal:
+) -> MapProposal:  # fmt: skip
     entries: dict[str, Entry] = {}
     remarks: dict[str, str] = {}
     left_out: dict[str, str] = {}

@@ -178,14 +178,9 @@ class Plan:
 
 
 def build_signals(
-    mapped: Mapping[str, tuple[Entry, Channel]],
-    *,
-    signal_map: SignalMap,
-    vehicle: Vehicle,
-    file_faults: Sequence[FileFaults] = (),
-    rate_hz: float | None = None,
-    dbc: Sequence[str] = (),
-) -> Signals:
+    mapped: Mapping[str, tuple[Entry, Channel]], *, signal_map: SignalMap, vehicle: Vehicle,
+    file_faults: Sequence[FileFaults] = (), rate_hz: float | None = None, dbc: Sequence[str] = (),
+) -> Signals:  # fmt: skip
     """Bring the mapped channels of one drive onto one integer-nanosecond grid.
 
     Continuous signals are interpolated linearly, or averaged over a grid step where they are more than twice as fast
@@ -235,15 +230,9 @@ def build_signals(
 
 
 def plan_drive(
-    found: Found,
-    take: Callable[[Mapping[str, Cleaner]], Mapping[str, Taken]],
-    *,
-    signal_map: SignalMap,
-    vehicle: Vehicle,
-    rate_hz: float | None = None,
-    most_rows: int = MAX_ROWS,
-    dbc: Sequence[str] = (),
-) -> Plan:
+    found: Found, take: Callable[[Mapping[str, Cleaner]], Mapping[str, Taken]], *, signal_map: SignalMap,
+    vehicle: Vehicle, rate_hz: float | None = None, most_rows: int = MAX_ROWS, dbc: Sequence[str] = (),
+) -> Plan:  # fmt: skip
     """Clean the signals of a drive and plan its grid.
 
     `take` passes all samples of some signals through their cleaners; signals without a sample may be left out. A signal
@@ -316,12 +305,9 @@ def _nothing_usable(whys: Sequence[str], found: Found) -> SignalError:
 
 
 def cleaners_of(
-    found: Found,
-    signal_map: SignalMap,
-    vehicle: Vehicle,
-    unmeasured: Mapping[str, Unmeasured] | None = None,
+    found: Found, signal_map: SignalMap, vehicle: Vehicle, unmeasured: Mapping[str, Unmeasured] | None = None,
     faults: dict[str, str] | None = None,
-) -> dict[str, Cleaner]:
+) -> dict[str, Cleaner]:  # fmt: skip
     """Return a cleaner for each signal whose unit fits, and in `faults` a note on each other."""
     cleaners = {}
     for name, (entry, info) in found.items():

@@ -73,15 +73,9 @@ class LongDrive:
 
 
 def long_drive(
-    found: Found,
-    parts: Parts,
-    *,
-    signal_map: SignalMap,
-    vehicle: Vehicle,
-    rate_hz: float | None = None,
-    dbc: Sequence[str] = (),
-    tell: Callable[[int], None] = lambda _: None,
-) -> LongDrive:
+    found: Found, parts: Parts, *, signal_map: SignalMap, vehicle: Vehicle, rate_hz: float | None = None,
+    dbc: Sequence[str] = (), tell: Callable[[int], None] = lambda _: None,
+) -> LongDrive:  # fmt: skip
     """Read the files once and plan the windows, of channels as `resolve` finds them; the rest as of `build_signals`.
 
     `parts` returns the pieces of the channels, from the start at each call; `tell` is called with the number of samples

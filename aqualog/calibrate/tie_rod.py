@@ -88,14 +88,9 @@ def _probed(
 
 
 def fit_tie_rod(
-    F_y_outward: FloatArray,
-    F_x: FloatArray,
-    measured: FloatArray,
-    *,
-    dt: float,
-    used: BoolArray | None = None,
+    F_y_outward: FloatArray, F_x: FloatArray, measured: FloatArray, *, dt: float, used: BoolArray | None = None,
     degree: int = 2,
-) -> TieRodFit:
+) -> TieRodFit:  # fmt: skip
     """Fit the polynomial of a tie-rod force in the forces of its wheel.
 
     Parameters

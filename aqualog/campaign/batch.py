@@ -94,16 +94,10 @@ def compared(todo: Sequence[Job], store: Store, *, force: bool) -> Compared:
 
 
 def run_batch(
-    configured: Configured,
-    store: Store,
-    *,
-    jobs: int = 1,
-    force: bool = False,
-    limits: Limits = NO_LIMITS,
-    elsewhere: WorkOn | None = None,
-    report: Report = lambda done, total, failed: None,
+    configured: Configured, store: Store, *, jobs: int = 1, force: bool = False, limits: Limits = NO_LIMITS,
+    elsewhere: WorkOn | None = None, report: Report = lambda done, total, failed: None,
     told: Callable[[str, str], None] = lambda name, reason: None,
-) -> BatchOutcome:
+) -> BatchOutcome:  # fmt: skip
     """Bring the store up to date with the campaign.
 
     Parameters
@@ -222,15 +216,9 @@ def _how_it_ended(crashed: Crashed, job: Job, limits: Limits) -> str:
 
 
 def _work(
-    configured: Configured,
-    store: Store,
-    new: Mapping[str, Job],
-    record: Callable[[str, Fault | Crashed | None], None],
-    *,
-    jobs: int,
-    limits: Limits,
-    elsewhere: WorkOn | None,
-) -> None:
+    configured: Configured, store: Store, new: Mapping[str, Job],
+    record: Callable[[str, Fault | Crashed | None], None], *, jobs: int, limits: Limits, elsewhere: WorkOn | None,
+) -> None:  # fmt: skip
     shared = (configured.signal_map, configured.dbc, configured.settings)
     tasks = {k: (store.address, k, j.seen, j.logs, j.vehicle, *shared) for k, j in new.items()}
     if elsewhere is None and store.is_shared and ((len(tasks) > _HERE and jobs > 1) or limits != NO_LIMITS):
@@ -256,15 +244,9 @@ def _work(
 
 
 def measure_one(
-    address: Address,
-    key: str,
-    seen: Seen,
-    logs: tuple[Path, ...],
-    vehicle: Vehicle,
-    signal_map: SignalMap,
-    dbc: tuple[Path, ...],
-    settings: Settings,
-) -> Fault | None:
+    address: Address, key: str, seen: Seen, logs: tuple[Path, ...], vehicle: Vehicle, signal_map: SignalMap,
+    dbc: tuple[Path, ...], settings: Settings,
+) -> Fault | None:  # fmt: skip
     """Measure one log into the store; returns None, or the reason why it gave no result."""
     try:
         store = Store(address)

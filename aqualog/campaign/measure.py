@@ -75,13 +75,9 @@ def measure(signals: Signals, vehicle: Vehicle, *, settings: Settings | None = N
 
 
 def measure_long(
-    drive: LongDrive,
-    vehicle: Vehicle,
-    *,
-    settings: Settings | None = None,
-    faults: Sequence[FileFaults] = (),
+    drive: LongDrive, vehicle: Vehicle, *, settings: Settings | None = None, faults: Sequence[FileFaults] = (),
     rows: int = ROWS,
-) -> Measurement:
+) -> Measurement:  # fmt: skip
     """The same of a drive that is longer than memory, in windows of so many rows: with the same samples, to the bit.
 
     `faults`: data that the readers lost in the first pass. Only the thinned samples are held whole: 3 MB of an hour.

@@ -98,13 +98,9 @@ class BatchCost:
 
 
 def measure_cost(
-    configured: Configured,
-    sample: Sequence[tuple[Job, str, int]],
-    *,
-    processes: int,
-    reporter: Callable[[], Report] = lambda: lambda done, total, failed: None,
-    told: Callable[[], None] = lambda: None,
-) -> BatchCost:
+    configured: Configured, sample: Sequence[tuple[Job, str, int]], *, processes: int,
+    reporter: Callable[[], Report] = lambda: lambda done, total, failed: None, told: Callable[[], None] = lambda: None,
+) -> BatchCost:  # fmt: skip
     """Measure a few logs, (job, format, bytes) each, into a store that is thrown away.
 
     After an installation the detectors are compiled with the first logs, which no other run pays: the sample is then

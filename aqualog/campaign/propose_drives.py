@@ -52,12 +52,9 @@ class Drive:
 
 
 def scan(
-    folder: Path,
-    *,
-    options: ReadOptions | None = None,
-    leave_out: Iterable[Path] = (),
+    folder: Path, *, options: ReadOptions | None = None, leave_out: Iterable[Path] = (),
     report: Callable[[str], None] = lambda _: None,
-) -> Found:
+) -> Found:  # fmt: skip
     """All logs in a folder and below it, by suffix and content.
 
     Hidden files, links to folders and stores of results are left out.
@@ -239,12 +236,9 @@ def _are_partners(
 
 
 def _without_copies(
-    members: Sequence[int],
-    logs: Sequence[LogFile],
-    kinds: Sequence[int],
-    rivals: Callable[[int, int], bool],
+    members: Sequence[int], logs: Sequence[LogFile], kinds: Sequence[int], rivals: Callable[[int, int], bool],
     notes: list[str],
-) -> list[int]:
+) -> list[int]:  # fmt: skip
     """The same drive in two formats counts once: names alike but for the suffix, and the wheels or all else in both."""
     kept: list[int] = []
     for i in sorted(members, key=lambda i: (_rank(logs[i].path), logs[i].name)):

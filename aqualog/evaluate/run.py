@@ -65,14 +65,9 @@ class Evaluation:
 
 
 def evaluate(
-    sources: Sequence[Source],
-    *,
-    thresholds: Thresholds = DEFAULT,
-    rivals: Mapping[str, float] | None = None,
-    with_roc: bool = False,
-    factors: Sequence[float] = FACTORS,
-    report: Report = lambda _: None,
-) -> Evaluation:
+    sources: Sequence[Source], *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None,
+    with_roc: bool = False, factors: Sequence[float] = FACTORS, report: Report = lambda _: None,
+) -> Evaluation:  # fmt: skip
     """Score all drives; report one that cannot be read and leave it out.
 
     Parameters
@@ -99,15 +94,10 @@ def evaluate(
 
 
 def tune(
-    sources: Sequence[Source],
-    *,
-    thresholds: Thresholds = DEFAULT,
-    rivals: Mapping[str, float] | None = None,
-    with_roc: bool = False,
-    factors: Sequence[float] = FACTORS,
-    limit_per_hour: float = LIMIT_PER_HOUR,
+    sources: Sequence[Source], *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None,
+    with_roc: bool = False, factors: Sequence[float] = FACTORS, limit_per_hour: float = LIMIT_PER_HOUR,
     report: Report = lambda _: None,
-) -> Evaluation:
+) -> Evaluation:  # fmt: skip
     """Propose thresholds on some drives and evaluate them on others; arguments as `evaluate`.
 
     Single detectors and rivals come first, then the joint ones with the single ones at their proposals. Only their
@@ -156,12 +146,9 @@ def _swept(drive: Drive, *, factors: Sequence[float], **given: Any) -> dict[floa
 
 
 def _each(
-    sources: Sequence[Source],
-    work: Callable[[Drive], dict[float, RunRecord]],
-    failed: dict[str, str],
-    report: Report,
+    sources: Sequence[Source], work: Callable[[Drive], dict[float, RunRecord]], failed: dict[str, str], report: Report,
     what: str,
-) -> list[dict[float, RunRecord]]:
+) -> list[dict[float, RunRecord]]:  # fmt: skip
     """Process the drives one after the other; give a reason for each that cannot be read, which is not tried again."""
     done = []
     for number, source in enumerate(sources, 1):

@@ -35,13 +35,9 @@ class RocPoint:
 
 
 def records_at(
-    drive: Drive,
-    factor: float,
-    *,
-    thresholds: Thresholds = DEFAULT,
-    rivals: Mapping[str, float] | None = None,
+    drive: Drive, factor: float, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None,
     names: Collection[str] = DETECTORS,
-) -> RunRecord:
+) -> RunRecord:  # fmt: skip
     """Run every detector over a drive at its own threshold times a factor.
 
     Joint detectors read the single ones. They run apart, with the single detectors at their original thresholds.
