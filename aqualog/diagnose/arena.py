@@ -97,11 +97,11 @@ class Arena:
         k = self.evidence.count
         for i, (p, w) in enumerate(zip(self.parts, weighings, strict=True)):
             rows = np.empty((self.width + 1, w.width), dtype=np.float32)
-            rows[:k] = w.single(p.signatures)
+            rows[:k] = w.rows(p.signatures, np.float32)
             rows[:k] *= self.sd[:k, None].astype(np.float32)
             for b in (*self.blocks, *self.forgiven):
                 if b.kind != "effect":
-                    rows[list(b.columns)] = w.single(self.drawn(i, b))
+                    rows[list(b.columns)] = w.rows(self.drawn(i, b), np.float32)
             rows[-1] = w.rows(p.residual[None])[0]
             total += products(rows)
         return total

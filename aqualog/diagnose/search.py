@@ -341,7 +341,7 @@ def _evidence(
     J = measure.rows(found.signatures) * arena.sd[columns, None]
     y = measure.rows([r[None] for r in found.residuals])[0] + (off / arena.sd[columns]) @ J
     doubtful = _doubtful(arena, found, off)
-    doubts, exact = measure.single(doubtful), np.concatenate([J, y[None]])
+    doubts, exact = measure.rows(doubtful, np.float32), np.concatenate([J, y[None]])
     order = [*range(len(J)), *range(len(exact), len(exact) + len(doubts)), len(J)]  # the residual last
     shared = measure.inner(exact, doubts)
     gram = np.block([[measure.inner(exact, exact), shared], [shared.T, measure.inner(doubts, doubts)]])

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -57,16 +56,8 @@ class Weighing:
         row = self.rows(residual[None])[0]
         return self.sharpness + 0.5 * float(row @ row)
 
-    def rows(self, x: FloatArray) -> FloatArray:
-        """Arrays (k, C, n) as rows (k, M)."""
-        return self._transformed(x, np.float64)
-
-    def single(self, x: FloatArray) -> npt.NDArray[np.float32]:
-        """The same in single precision, which takes half of memory."""
-        rows: npt.NDArray[Any] = self._transformed(x, np.float32)
-        return rows
-
-    def _transformed(self, x: FloatArray, kind: npt.DTypeLike) -> FloatArray:
+    def rows(self, x: FloatArray, kind: npt.DTypeLike = np.float64) -> FloatArray:
+        """Arrays (k, C, n) as rows (k, M); single precision takes half of memory."""
         out: FloatArray = np.empty((len(x), self.width), dtype=kind)
 
         def fill(i: int) -> None:
