@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena, products
@@ -60,7 +62,7 @@ class Begun:
     """
 
     arena: Arena
-    columns: tuple[FloatArray, ...]
+    columns: tuple[npt.NDArray[Any], ...]
     whitely: FloatArray
     tried: dict[tuple[Members, bytes], _Noise]
 

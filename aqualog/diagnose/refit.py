@@ -74,7 +74,7 @@ class Metric:
     def rows(self, each: Sequence[FloatArray], kind: npt.DTypeLike = np.float64) -> FloatArray:
         """Arrays (k, C, n) of each drive as rows (k, N)."""
         found = [w.rows(each[p.drive][..., p.at], kind) for p, w in zip(self.parts, self.weighings, strict=True)]
-        return np.concatenate(found, axis=1) * np.asarray(math.sqrt(self.coarse), dtype=kind)
+        return np.asarray(np.concatenate(found, axis=1) * np.asarray(math.sqrt(self.coarse), dtype=kind))
 
     def inner(self, u: FloatArray, w: FloatArray) -> FloatArray:
         """Inner products of rows (a, N) and (b, N): (a, b)."""

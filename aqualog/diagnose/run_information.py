@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +34,9 @@ _ASSUMED = {"force_balance": 0.1, "kinematic": 0.15, "lateral": 0.2, "tie_rod": 
 _ASSUMED_SPEED = 0.05  # [m/s] of all others
 
 
+_Driven = tuple[Drive, list[FloatArray], dict[int, FloatArray]]
+
+
 @dataclass(frozen=True, slots=True)
 class Case:
     """The decision to make: the sets with their probabilities, and tolerances as (hypothesis, parameter, its sd)."""
@@ -45,7 +47,8 @@ class Case:
     model: Model
     tolerances: tuple[tuple[int, Hypothesis, str, float], ...]  # the first is the column of the evidence
     like: int  # the drive whose signals, noise and water a run is assumed to have
-    runs: dict[tuple[Run, Sensor | None], _Driven] = field(default_factory=dict)  # those that were simulated
+    # those that were simulated: what each set leaves, then the sets' own columns; tolerances by identity
+    runs: dict[tuple[Run, Sensor | None], _Driven] = field(default_factory=dict)
 
     @property
     def drive(self) -> Drive:
@@ -73,14 +76,6 @@ class Case:
             out.append([*range(at, at + k), *range(total, total + len(self.tolerances))])
             at += k
         return out
-
-
-class _Driven(NamedTuple):
-    """A run under the best set: what each set leaves of it, the sets' own columns, and tolerances by identity."""
-
-    drive: Drive
-    rows: list[FloatArray]
-    shown: dict[int, FloatArray]
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,14 +176,14 @@ def of_run(case: Case, run: Run, sensor: Sensor | None = None) -> FloatArray:
 def _seen(case: Case, run: Run, sensor: Sensor | None) -> _Driven:
     drive = _driven(case, run, sensor)
     if not drive.mask.any():
-        return _Driven(drive, [], {})
+        return drive, [], {}
     models = [turned(c.refit.model) if run.opposite else c.refit.model for c in case.rivals]
     left = [residual(drive, m) for m in models]
     own = [
         s for m, c, r in zip(models, case.rivals, left, strict=True)
         for s in _signatures(drive, m, c.refit.members, r, run, each=True)
     ]  # fmt: skip
-    return _Driven(drive, [np.array(left), *own], {})
+    return drive, [np.array(left), *own], {}
 
 
 def _signatures(

@@ -26,8 +26,6 @@ SLOPED = 60  # lines whose power may follow a power law
 FASTEST_HZ, BLOCK_S = 1.5, 0.1  # half of the log-likelihood counts there: cars pitch at 1 to 2 Hz (K); samples' step
 CHUNK, TILE = 6, 256  # columns, and their lines, that are transformed together and stay in the processor's memory
 
-Complex = npt.NDArray[np.complex128]
-
 
 @dataclass(frozen=True, slots=True)
 class Weighing:
@@ -141,7 +139,7 @@ def _power_law(power: FloatArray) -> FloatArray:
     return np.asarray((SLOPED / np.minimum(k, SLOPED))[:, None] ** (0.5 * b), dtype=np.float64)
 
 
-def _averaged(cross: Complex) -> Complex:
+def _averaged(cross: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
     """Means over neighbouring frequencies of cross-spectra (F, C, C), reflected at both ends."""
     count = cross.shape[0]
     reach = np.clip((BANDWIDTH * np.arange(count)).astype(np.int64), NARROWEST, WIDEST)
@@ -150,5 +148,5 @@ def _averaged(cross: Complex) -> Complex:
     padded = np.concatenate([cross[width:0:-1].conj(), cross, cross[-2 : -width - 2 : -1].conj()])
     total = np.concatenate([np.zeros((1, *cross.shape[1:])), np.cumsum(padded, axis=0)])
     at = np.arange(count) + width
-    means: Complex = (total[at + reach + 1] - total[at - reach]) / (2.0 * reach + 1.0)[:, None, None]
+    means: npt.NDArray[np.complex128] = (total[at + reach + 1] - total[at - reach]) / (2.0 * reach + 1.0)[:, None, None]
     return means
