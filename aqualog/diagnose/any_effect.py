@@ -80,7 +80,8 @@ def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: 
     inflation = np.maximum(np.mean(drawn, axis=0) / sizes, 1.0)[groups]
     maxima = (drawn / inflation / sizes)[:, leaders].max(axis=1)
     # where tolerances are larger than the noise, noise alone gives almost no gain; the car's own deviations do
-    threshold = max(_gumbel_quantile(maxima, level), bound)
+    mu, beta = _gumbel(maxima)
+    threshold = max(mu - beta * math.log(-math.log1p(-level)), bound)
     return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()), len(leaders))
 
 
@@ -108,16 +109,14 @@ def _sizes(evidence: Evidence) -> FloatArray:
 
 def gumbel_p(maxima: FloatArray, x: float) -> float:
     """Share of null maxima beyond x, by a Gumbel distribution of their mean and spread; never below theirs counted."""
-    beta = max(float(maxima.std(ddof=1)) * math.sqrt(6.0) / math.pi, 1e-9)
-    mu = float(maxima.mean()) - EULER * beta
-    tail = -math.expm1(-math.exp(min(-(x - mu) / beta, 50.0)))
+    mu, beta = _gumbel(maxima)
+    tail = -math.expm1(-math.exp(min(-(x - mu) / max(beta, 1e-9), 50.0)))
     return max(tail, float((maxima >= x).mean()))
 
 
-def _gumbel_quantile(maxima: FloatArray, level: float) -> float:
+def _gumbel(maxima: FloatArray) -> tuple[float, float]:
     beta = float(maxima.std(ddof=1)) * math.sqrt(6.0) / math.pi
-    mu = float(maxima.mean()) - EULER * beta
-    return mu - beta * math.log(-math.log1p(-level))
+    return float(maxima.mean()) - EULER * beta, beta
 
 
 def _groups(evidence: Evidence, gram: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.intp]]:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -93,38 +94,32 @@ class Arena:
 
     def inner(self, weighings: Sequence[Weighing]) -> FloatArray:
         """Inner products (K + 1, K + 1) of all columns, the residual last, summed over the parts."""
-        total = np.zeros((self.width + 1, self.width + 1))
-        k = self.evidence.count
-        for i, (p, w) in enumerate(zip(self.parts, weighings, strict=True)):
-            rows = np.empty((self.width + 1, w.width), dtype=np.float32)
-            rows[:k] = w.single(p.signatures)
-            rows[:k] *= self.sd[:k, None].astype(np.float32)
-            for b in (*self.blocks, *self.forgiven):
-                if b.kind != "effect":
-                    rows[list(b.columns)] = w.single(self.drawn(i, b))
-            rows[-1] = w.rows(p.residual[None])[0]
-            total += products(rows)
-        return total
+        each = enumerate(weighings)
+        return np.asarray(sum(self._inner(i, w.width, partial(w.rows, kind=np.float32)) for i, w in each))
 
     def white(self) -> FloatArray:
         """The same under white noise of the size of the residuals' steps."""
         total = np.zeros((self.width + 1, self.width + 1))
-        known = self.evidence.count
         for i, p in enumerate(self.parts):
             noise = white_noise(p.residual, p.mask, contrasts(p.channels))
             used = np.asarray((noise.weights > 0.0).any(axis=0))
-            rows = np.empty((self.width + 1, p.residual.shape[0] * int(used.sum())), dtype=np.float32)
 
             def white(x: FloatArray, rotation: FloatArray = noise.rotation, used: BoolArray = used) -> FloatArray:
                 return np.asarray(np.matmul(rotation, x)[..., used].reshape(len(x), -1))
 
-            rows[:known] = white(p.signatures * self.sd[:known, None, None])
-            for b in (*self.blocks, *self.forgiven):
-                if b.kind != "effect":
-                    rows[list(b.columns)] = white(self.drawn(i, b))
-            rows[-1] = white(p.residual[None])[0]
-            total += products(rows)
+            total += self._inner(i, p.residual.shape[0] * int(used.sum()), white)
         return total
+
+    def _inner(self, part: int, width: int, turned: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        p, k = self.parts[part], self.evidence.count
+        rows = np.empty((self.width + 1, width), dtype=np.float32)
+        rows[:k] = turned(p.signatures)
+        rows[:k] *= self.sd[:k, None].astype(np.float32)
+        for b in (*self.blocks, *self.forgiven):
+            if b.kind != "effect":
+                rows[list(b.columns)] = turned(self.drawn(part, b))
+        rows[-1] = turned(p.residual[None])[0]
+        return products(rows)
 
     def tolerant(self, gram: FloatArray) -> FloatArray:
         """Inner products that forgive the tolerances, by Woodbury's identity."""
@@ -283,7 +278,7 @@ def _tolerance(evidence: Evidence, made: Sequence[Shape], blocks: Sequence[Block
     return out
 
 
-def products(rows: npt.NDArray[np.float32]) -> FloatArray:
+def products(rows: npt.NDArray[Any]) -> FloatArray:
     """Inner products of single-precision rows, in double precision: else large ones would not be positive definite."""
 
     def of(i: int) -> FloatArray:

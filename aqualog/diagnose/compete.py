@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena, products
@@ -60,7 +62,7 @@ class Begun:
     """
 
     arena: Arena
-    columns: tuple[FloatArray, ...]
+    columns: tuple[npt.NDArray[Any], ...]
     whitely: FloatArray
     tried: dict[tuple[Members, bytes], _Noise]
 
@@ -81,10 +83,11 @@ def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -
     found. The noise is sought with the whole likelihood, in at most so many rounds; the posterior has a share of it.
     `begun`: of the same arena, where fewer rounds of it are known already.
     """
+    only = begun is None
     begun = begun or begin(arena)
     noise = begun.after((), None)
     gram = arena.inner(noise.weighings)
-    for number in range(rounds):
+    for number in range(only, rounds + only):  # what is only asked for once is not kept
         tolerant = arena.tolerant(gram)
         sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram), width=ROUGHLY)
         best = max(sets, key=lambda k: sets[k])
@@ -148,7 +151,7 @@ def _beside(begun: Begun, members: Members, fit: Fitted | None) -> _Noise:
     gram = np.zeros((at + 1, at + 1))
     for i, (p, w) in enumerate(zip(arena.parts, weighings, strict=True)):
         drawn = w.rows(np.concatenate([*(arena.drawn(i, arena.blocks[m]) for m in members), p.residual[None]]))
-        gram += products(np.concatenate([w.single(begun.columns[i]), drawn], dtype=np.float32))
+        gram += products(np.concatenate([w.rows(begun.columns[i], np.float32), drawn], dtype=np.float32))
     allowed = np.zeros((at, at))
     allowed[:r, :r] = np.eye(r)
     forgiven = forgiving(gram, allowed)

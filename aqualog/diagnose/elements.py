@@ -141,34 +141,28 @@ def _patches(name: str, x: FloatArray, weights: FloatArray, scores: FloatArray) 
 @compiled
 def _fold(x, rates, weights, scores, where):  # type: ignore[no-untyped-def]
     """Fill start, length and period of the patch that explains most, for each row of weights and scores (k, n)."""
-    low = x.min()
-    span = x.max() - low
+    low, best = x.min(), np.zeros(len(weights))
     at = np.empty(x.size, dtype=np.int64)
-    # phases of one turn, twice: a patch may begin at the end of a turn
-    sums = np.zeros((2, 2 * PHASES + 1))
-    best = np.zeros(len(weights))
     for f in rates:
+        period = (x.max() - low) / f
         for t in range(x.size):
-            turns = (x[t] - low) / span * f
+            turns = (x[t] - low) / period
             at[t] = int((turns - np.floor(turns)) * PHASES)
         for k in range(len(weights)):
-            sums[:] = 0.0
+            w, s = np.zeros(PHASES), np.zeros(PHASES)
             for t in range(x.size):
-                sums[0, 1 + at[t]] += weights[k, t]
-                sums[1, 1 + at[t]] += scores[k, t]
+                w[at[t]] += weights[k, t]
+                s[at[t]] += scores[k, t]
+            total, right = w.sum(), s.sum()
             for i in range(PHASES):
-                sums[:, 1 + i] += sums[:, i]
-            for i in range(1, PHASES + 1):
-                sums[:, PHASES + i] = sums[:, PHASES] + sums[:, i]
-            total, right = sums[0, PHASES], sums[1, PHASES]
-            for i in range(PHASES):
-                for j in range(1, PHASES // 2 + 1):
-                    a, b = sums[0, i + j] - sums[0, i], sums[1, i + j] - sums[1, i]
+                a = b = 0.0
+                for j in range(PHASES // 2):  # a patch may begin at the end of a turn
+                    a += w[(i + j) % PHASES]
+                    b += s[(i + j) % PHASES]
                     gain = (b - a / total * right) ** 2 / max(a * (1.0 - a / total), 1e-9 * total)
                     if gain > best[k]:
                         best[k] = gain
-                        where[k, 0], where[k, 1] = low + i / PHASES * span / f, j / PHASES * span / f
-                        where[k, 2] = span / f
+                        where[k] = low + i / PHASES * period, (j + 1) / PHASES * period, period
 
 
 def _patch(

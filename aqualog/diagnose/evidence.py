@@ -114,8 +114,7 @@ class Forgiven(NamedTuple):
 
 
 def forgiving(gram: FloatArray, tolerance: FloatArray) -> Forgiven:
-    """Inner products of K columns and residuals in a metric that tolerates deviations of the covariance `tolerance`
-    (K, K).
+    """Inner products of K columns and residuals in a metric that tolerates deviations of covariance `tolerance` (K, K).
 
     No vehicle file is exact and no simulator is the car: a radius may be 0.03 % off, a tyre's curve a few percent. With
     enough samples every such error is significant. The covariance of the residual is that of the noise plus that of all

@@ -53,11 +53,6 @@ class Noise:
         used = self.weights > 0.0
         return -float(sharp) * float(used.sum()) / len(self.taps) - float(np.log(self.weights[used]).sum())
 
-    @property
-    def count(self) -> float:
-        """Number of samples that count."""
-        return float((self.weights**2).sum())
-
 
 def bridged(x: FloatArray, mask: BoolArray) -> FloatArray:
     """Masked samples by straight lines between usable ones, in the precision of x. (..., n)"""
@@ -78,14 +73,8 @@ def bridged(x: FloatArray, mask: BoolArray) -> FloatArray:
 
 def good_size(n: int) -> int:
     """Smallest size from n on with small prime factors."""
-    best = 1 << (n - 1).bit_length()
-    for p5 in (1, 5, 25):
-        for p3 in (1, 3, 9):
-            size = p5 * p3
-            while size < n:
-                size *= 2
-            best = min(best, size)
-    return best
+    odd = (1, 3, 5, 9, 15, 25, 45, 75, 225)
+    return min(k << max((n - 1) // k, 0).bit_length() for k in odd)
 
 
 def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> Noise:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+import numpy.typing as npt
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import FloatArray
@@ -18,8 +18,6 @@ from aqualog.diagnose.spectrum import Weighing
 from aqualog.model.term import Model
 
 __all__ = ["KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "metric", "refit"]
-
-Rows = FloatArray | NDArray[np.float32]
 
 KNOWN = 0.25  # share of the tolerances that values and intervals take into account
 PRIOR_WIDTH = 3.0  # the prior is this much wider than the effect's: it only keeps huge, cancelling pairs apart
@@ -68,22 +66,17 @@ class Metric:
 
     parts: tuple[Part, ...]
     weighings: tuple[Weighing, ...]
-    A: NDArray[np.float32]
+    A: FloatArray
     M: FloatArray
     apart: FloatArray
     coarse: float = 1.0
 
-    def rows(self, each: Sequence[FloatArray]) -> FloatArray:
+    def rows(self, each: Sequence[FloatArray], kind: npt.DTypeLike = np.float64) -> FloatArray:
         """Arrays (k, C, n) of each drive as rows (k, N)."""
-        found = [w.rows(each[p.drive][..., p.at]) for p, w in zip(self.parts, self.weighings, strict=True)]
-        return math.sqrt(self.coarse) * np.concatenate(found, axis=1)
+        found = [w.rows(each[p.drive][..., p.at], kind) for p, w in zip(self.parts, self.weighings, strict=True)]
+        return np.asarray(np.concatenate(found, axis=1) * np.asarray(math.sqrt(self.coarse), dtype=kind))
 
-    def single(self, each: Sequence[FloatArray]) -> NDArray[np.float32]:
-        """The same in single precision."""
-        found = [w.single(each[p.drive][..., p.at]) for p, w in zip(self.parts, self.weighings, strict=True)]
-        return np.float32(math.sqrt(self.coarse)) * np.concatenate(found, axis=1)
-
-    def inner(self, u: Rows, w: Rows) -> FloatArray:
+    def inner(self, u: FloatArray, w: FloatArray) -> FloatArray:
         """Inner products of rows (a, N) and (b, N): (a, b)."""
         at_u = self.across(u)
         out = -at_u @ self.M @ (at_u if w is u else self.across(w)).T
@@ -92,7 +85,7 @@ class Metric:
             out += x @ (x if w is u else w[:, i : i + CHUNK].astype(np.float64, copy=False)).T
         return np.asarray(out)
 
-    def across(self, u: Rows) -> FloatArray:
+    def across(self, u: FloatArray) -> FloatArray:
         """Inner products of rows (a, N) with those of the tolerances, in double precision. (a, k)"""
         out = np.zeros((len(u), len(self.A)))
         for i in range(0, u.shape[1], CHUNK):
@@ -131,7 +124,7 @@ def metric(
     for i, (p, w) in enumerate(zip(arena.parts, weighings, strict=True)):
         columns = [p.signatures[k] * sd[k, None, None]]
         columns += [np.tensordot(np.linalg.cholesky(b.prior).T, arena.drawn(i, b), axes=1) for b in arena.forgiven]
-        pieces.append(w.single(np.concatenate(columns)))
+        pieces.append(w.rows(np.concatenate(columns), np.float32))
     A = np.concatenate(pieces, axis=1) if len(pieces) > 1 else pieces[0]
     A *= np.float32(math.sqrt(coarse))
     M = np.asarray(np.linalg.inv(np.eye(len(A)) + products(A)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -34,6 +34,9 @@ _ASSUMED = {"force_balance": 0.1, "kinematic": 0.15, "lateral": 0.2, "tie_rod": 
 _ASSUMED_SPEED = 0.05  # [m/s] of all others
 
 
+_Driven = tuple[Drive, list[FloatArray], dict[int, FloatArray]]
+
+
 @dataclass(frozen=True, slots=True)
 class Case:
     """The decision to make: the sets with their probabilities, and tolerances as (hypothesis, parameter, its sd)."""
@@ -44,6 +47,8 @@ class Case:
     model: Model
     tolerances: tuple[tuple[int, Hypothesis, str, float], ...]  # the first is the column of the evidence
     like: int  # the drive whose signals, noise and water a run is assumed to have
+    # those that were simulated: what each set leaves, then the sets' own columns; tolerances by identity
+    runs: dict[tuple[Run, Sensor | None], _Driven] = field(default_factory=dict)
 
     @property
     def drive(self) -> Drive:
@@ -155,22 +160,30 @@ def forecast(case: Case, log: FloatArray, run: FloatArray, times: int, group: Fl
 
 def of_run(case: Case, run: Run, sensor: Sensor | None = None) -> FloatArray:
     """Inner products of the rows of a run, simulated under the best set; zero if no sample of it can be used."""
-    drive = _driven(case, run, sensor)
-    n = len(case.rivals) + sum(len(c.refit.names) for c in case.rivals) + len(case.tolerances)
-    if not drive.mask.any():
+    drive, rows, shown = case.runs.get((run, sensor)) or case.runs.setdefault((run, sensor), _seen(case, run, sensor))
+    if not rows:
+        n = len(case.rivals) + sum(len(c.refit.names) for c in case.rivals) + len(case.tolerances)
         return np.zeros((n, n))
-    models, model = [c.refit.model for c in case.rivals], case.model
-    if run.opposite:
-        models, model = [turned(m) for m in models], turned(model)
+    model = turned(case.model) if run.opposite else case.model
+    asked = {id(h): h for _, h, _, _ in case.tolerances}
+    if new := [h for i, h in asked.items() if i not in shown]:
+        parts = _signatures(drive, model, new, residual(drive, model), run, each=False)
+        shown.update(zip(map(id, new), parts, strict=True))
+    weighed = _weighed(case, drive, np.concatenate([*rows, *(shown[i] for i in asked)]))
+    return np.asarray(COARSE * weighed @ weighed.T)
+
+
+def _seen(case: Case, run: Run, sensor: Sensor | None) -> _Driven:
+    drive = _driven(case, run, sensor)
+    if not drive.mask.any():
+        return drive, [], {}
+    models = [turned(c.refit.model) if run.opposite else c.refit.model for c in case.rivals]
     left = [residual(drive, m) for m in models]
     own = [
         s for m, c, r in zip(models, case.rivals, left, strict=True)
         for s in _signatures(drive, m, c.refit.members, r, run, each=True)
     ]  # fmt: skip
-    asked = list({id(h): h for _, h, _, _ in case.tolerances}.values())
-    shown = _signatures(drive, model, asked, residual(drive, model), run, each=False)
-    rows = _weighed(case, drive, np.concatenate([np.array(left), *own, *shown]))
-    return np.asarray(COARSE * rows @ rows.T)
+    return drive, [np.array(left), *own], {}
 
 
 def _signatures(

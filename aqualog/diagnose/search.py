@@ -115,11 +115,14 @@ def search(
     first = known_only(arena, ())
     begun = begin(first)
 
-    def look() -> None:
-        posterior = compete(first, rounds=1, begun=begun)
-        tell(f"at first sight {_likeliest(first, posterior)}; comparing with unknown forms", 0.25)
+    def look(wide: Arena) -> Arena:
+        if wide is not first:
+            return with_elements(wide)
+        seen = _likeliest(first, compete(first, rounds=1, begun=begun))
+        tell(f"at first sight {seen}; comparing with unknown forms", 0.25)
+        return first
 
-    arena = beside(lambda f: f(), [look, lambda: with_elements(arena)])[1]
+    arena = beside(look, [first, arena])[1]
     posterior = compete(arena)
     k = np.r_[np.arange(evidence.count), -1]
     scale = np.append(arena.sd[: evidence.count], 1.0)
@@ -341,7 +344,7 @@ def _evidence(
     J = measure.rows(found.signatures) * arena.sd[columns, None]
     y = measure.rows([r[None] for r in found.residuals])[0] + (off / arena.sd[columns]) @ J
     doubtful = _doubtful(arena, found, off)
-    doubts, exact = measure.single(doubtful), np.concatenate([J, y[None]])
+    doubts, exact = measure.rows(doubtful, np.float32), np.concatenate([J, y[None]])
     order = [*range(len(J)), *range(len(exact), len(exact) + len(doubts)), len(J)]  # the residual last
     shared = measure.inner(exact, doubts)
     gram = np.block([[measure.inner(exact, exact), shared], [shared.T, measure.inner(doubts, doubts)]])

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,8 +25,6 @@ NARROWEST, WIDEST = 10, 40  # bins to either side
 SLOPED = 60  # lines whose power may follow a power law
 FASTEST_HZ, BLOCK_S = 1.5, 0.1  # half of the log-likelihood counts there: cars pitch at 1 to 2 Hz (K); samples' step
 CHUNK, TILE = 6, 256  # columns, and their lines, that are transformed together and stay in the processor's memory
-
-Complex = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,16 +54,8 @@ class Weighing:
         row = self.rows(residual[None])[0]
         return self.sharpness + 0.5 * float(row @ row)
 
-    def rows(self, x: FloatArray) -> FloatArray:
-        """Arrays (k, C, n) as rows (k, M)."""
-        return self._transformed(x, np.float64)
-
-    def single(self, x: FloatArray) -> npt.NDArray[np.float32]:
-        """The same in single precision, which takes half of memory."""
-        rows: npt.NDArray[Any] = self._transformed(x, np.float32)
-        return rows
-
-    def _transformed(self, x: FloatArray, kind: npt.DTypeLike) -> FloatArray:
+    def rows(self, x: FloatArray, kind: npt.DTypeLike = np.float64) -> FloatArray:
+        """Arrays (k, C, n) as rows (k, M); single precision takes half of memory."""
         out: FloatArray = np.empty((len(x), self.width), dtype=kind)
 
         def fill(i: int) -> None:
@@ -150,7 +139,7 @@ def _power_law(power: FloatArray) -> FloatArray:
     return np.asarray((SLOPED / np.minimum(k, SLOPED))[:, None] ** (0.5 * b), dtype=np.float64)
 
 
-def _averaged(cross: Complex) -> Complex:
+def _averaged(cross: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
     """Means over neighbouring frequencies of cross-spectra (F, C, C), reflected at both ends."""
     count = cross.shape[0]
     reach = np.clip((BANDWIDTH * np.arange(count)).astype(np.int64), NARROWEST, WIDEST)
@@ -159,5 +148,5 @@ def _averaged(cross: Complex) -> Complex:
     padded = np.concatenate([cross[width:0:-1].conj(), cross, cross[-2 : -width - 2 : -1].conj()])
     total = np.concatenate([np.zeros((1, *cross.shape[1:])), np.cumsum(padded, axis=0)])
     at = np.arange(count) + width
-    means: Complex = (total[at + reach + 1] - total[at - reach]) / (2.0 * reach + 1.0)[:, None, None]
+    means: npt.NDArray[np.complex128] = (total[at + reach + 1] - total[at - reach]) / (2.0 * reach + 1.0)[:, None, None]
     return means
