@@ -14,10 +14,8 @@ N = 400
 class Plain:
     """White noise of size one, without tolerances."""
 
-    def rows(self, each):
-        return np.concatenate([x.reshape(len(x), -1) for x in each], axis=1)
-
-    single = rows
+    def rows(self, each, kind=np.float64):
+        return np.concatenate([x.reshape(len(x), -1) for x in each], axis=1, dtype=kind)
 
     def inner(self, u, w):
         return u @ w.T
