@@ -34,7 +34,7 @@ __all__ = [
 AGREES = 0.01  # p-value below which drives are reported to differ
 SURE = 0.95  # probability from which a cause is named
 # probability of a name, at the least and at the most: the posterior knows only the causes of the library. Of 86 that it
-# held for certain, on drives of four other simulators, 0.92 (0.84 to 0.97) were there (D)
+# held for certain, on drives of three other simulators, 0.92 (0.84 to 0.97) were there (D)
 LEAST, MOST = 5e-5, 0.97
 
 Verdict = Literal["no_effect", "named", "compound", "cannot_tell", "unexplained", "not_testable"]
@@ -287,5 +287,5 @@ class Diagnosis:
 
 
 def tempered(p: float) -> float:
-    """The probability of a name with the share `p` of a posterior that is coarsened (`competition.COARSE`)."""
+    """The probability of a name with the share `p` of a coarsened posterior (`competition.COARSE`), up to `MOST`."""
     return min(max(p, LEAST), MOST)

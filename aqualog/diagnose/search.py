@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -115,14 +116,13 @@ def search(
     first = known_only(arena, ())
     begun = begin(first)
 
-    def look(wide: Arena) -> Arena:
-        if wide is not first:
-            return with_elements(wide)
+    def look() -> Arena:
         seen = _likeliest(first, compete(first, rounds=1, begun=begun))
         tell(f"at first sight {seen}; comparing with unknown forms", 0.25)
         return first
 
-    arena = beside(look, [first, arena])[1]
+    both: list[Callable[[], Arena]] = [look, partial(with_elements, arena)]
+    arena = beside(lambda f: f(), both)[1]
     posterior = compete(arena)
     k = np.r_[np.arange(evidence.count), -1]
     scale = np.append(arena.sd[: evidence.count], 1.0)
@@ -196,14 +196,14 @@ def _led(evidence: Evidence, arena: Arena, posterior: Posterior, model: Model) -
     A set with an effect on the measured velocity is led by its own model. Without this, such an effect would get what a
     load changes of the target speed.
     """
-    columns = [c for h in _effects(arena, posterior.best) for c in evidence.columns[h]]
-    start = np.clip(_start(arena, posterior, posterior.best), evidence.low[columns], evidence.high[columns])
-    left, found = iter(start.tolist()), []
-    for h in (evidence.asked[i] for i in _effects(arena, posterior.best)):
-        found.append((h, {n: value_in(model, h, n) + next(left) for n in h.free}))
+    best = _effects(arena, posterior.best)
+    columns = [c for h in best for c in evidence.columns[h]]
+    start = _start(arena, posterior, posterior.best)
+    off = iter(np.clip(start, evidence.low[columns], evidence.high[columns]).tolist())
+    own = [evidence.asked[i] for i in best]
+    found = [(h, {n: value_in(model, h, n) + next(off) for n in h.free}) for h in own]
     try:
-        best = with_values(model, found)
-        return replace(evidence, drives=tuple(led_by(d, best) for d in evidence.drives))
+        return replace(evidence, drives=tuple(led_by(d, with_values(model, found)) for d in evidence.drives))
     except ConfigError:
         return evidence
 
@@ -435,5 +435,5 @@ def sharpened(found: Found, option: Option, model: Model) -> tuple[Refit | None,
         y = known.rows([x[None] for x in r.residuals])
         return float(known.inner(y, y)[0, 0]) + r.unlikely
 
-    best = option.refit if again is None or again.at_bound else min(option.refit, again, key=loss)
+    best = option.refit if again is None or again.at_bound else min(again, option.refit, key=loss)
     return best, loss(best)
