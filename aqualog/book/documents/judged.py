@@ -78,6 +78,7 @@ DIAGNOSE = Document(
         text("verdict", "all six are results", ("no_effect", "named", "compound", "cannot_tell", "unexplained",
              "not_testable")),
         text("sentence", "the verdict in words"),
+        text("caution", "what to know before the verdict; null without one", null=True),
         rows("causes", "the causes; with `cannot_tell` the set that the log cannot separate", _CAUSE),
         several("alternatives", "keys of other sets of causes that explain it about as well", several("", "")),
         rows("alternative_sets", "the same with their estimates", (
