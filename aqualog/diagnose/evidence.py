@@ -114,7 +114,8 @@ class Forgiven(NamedTuple):
 
 
 def forgiving(gram: FloatArray, tolerance: FloatArray) -> Forgiven:
-    """Inner products of K columns and residuals in a metric that tolerates deviations of covariance `tolerance` (K, K).
+    """Inner products of K columns, or of these and residuals, with themselves and any number of residuals, in a metric
+    that tolerates deviations of covariance `tolerance` (K, K).
 
     No vehicle file is exact and no simulator is the car: a radius may be 0.03 % off, a tyre's curve a few percent. With
     enough samples every such error is significant. The covariance of the residual is that of the noise plus that of all
@@ -123,10 +124,9 @@ def forgiving(gram: FloatArray, tolerance: FloatArray) -> Forgiven:
     k = np.flatnonzero((np.diag(tolerance) > 0.0) & (np.diag(gram)[: len(tolerance)] > 1e-12))
     P = tolerance[np.ix_(k, k)]
     root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
-    B = gram[:, k] @ root
     C = np.linalg.cholesky(np.eye(k.size) + root.T @ gram[np.ix_(k, k)] @ root)
-    half = np.linalg.solve(C, B.T)
-    return Forgiven(np.asarray(gram - half.T @ half), float(np.log(np.diag(C)).sum()))
+    half = np.linalg.solve(C, root.T @ gram[k])
+    return Forgiven(np.asarray(gram - half[:, : len(gram)].T @ half), float(np.log(np.diag(C)).sum()))
 
 
 def tolerant(evidence: Evidence, gram: FloatArray) -> FloatArray:

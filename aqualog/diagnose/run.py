@@ -15,6 +15,7 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, widened
+from aqualog.diagnose.any_effect import SURROGATES
 from aqualog.diagnose.arena import KNOWN_PRIOR
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
@@ -57,7 +58,7 @@ class Options:
 
     seed: int = 1
     level: float = 0.01
-    surrogates: int = 49
+    surrogates: int = SURROGATES
     views: bool = True
     consequences: bool = True
 

@@ -226,7 +226,7 @@ def diagnose(
     level : float
         Share of drives without effect that may be given one, 0.0001 to 0.5.
     surrogates : int, optional
-        Drives without effect that calibrate the test; 0: the test by its formula alone. Default 49, of a campaign 299.
+        Draws of noise that calibrate the test; 0: the test by its formula alone. Default 499.
     views : bool
         Keep the residuals before and after for page and figure, as the command does with `--page`. The document then
         has the units of all channels.

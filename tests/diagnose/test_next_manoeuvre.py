@@ -11,7 +11,7 @@ from aqualog.diagnose import run_information
 from aqualog.diagnose.arena import make_arena
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.competition import COARSE
-from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.drive import led_by, prepare
 from aqualog.diagnose.hypotheses import hypotheses, residual
 from aqualog.diagnose.manoeuvres import KMH, RUNS, programme, turned
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
@@ -72,15 +72,16 @@ def case(drives, sets):
     evidence = simulated(drives, asked, Model(), lambda _text, _share: None)
     at = {h.key: i for i, h in enumerate(asked)}
     arena = make_arena(evidence, Model())
-    left = evidence.residuals
+    left, led = evidence.residuals, evidence
     for _ in range(3):
         # noise is what the best set leaves: an effect that is still there would pass for slow noise
         scales = [weighing([left[p.drive][:, p.at]], p.mask, contrasts(drives[0].channels)) for p in arena.parts]
         measure = metric(arena, scales, coarse=COARSE)
         chosen = [[at[k] for k in s] for s in sets]
         start = [np.zeros(sum(len(asked[m].free) for m in c)) for c in chosen]
-        found = [refit(evidence, c, x, measure, Model()) for c, x in zip(chosen, start, strict=True)]
-        left = found[0].residuals
+        found = [refit(led, c, x, measure, Model()) for c, x in zip(chosen, start, strict=True)]
+        # as the search does: else a gain would get what a load changes of the target speed
+        left, led = found[0].residuals, replace(evidence, drives=tuple(led_by(d, found[0].model) for d in drives))
     noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(left, drives, strict=True)]
     loss = np.array([r.loss for r in found])
     p = np.exp(-0.5 * (loss - loss.min()))

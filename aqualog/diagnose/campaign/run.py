@@ -12,6 +12,7 @@ from aqualog.campaign.results import CampaignData
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
+from aqualog.diagnose.any_effect import SURROGATES
 from aqualog.diagnose.campaign.advice import advice
 from aqualog.diagnose.campaign.catalogue import hypotheses, untested
 from aqualog.diagnose.campaign.compete import Found, Option, compete
@@ -41,7 +42,7 @@ def diagnose_campaign(
     *,
     seed: int = 1,
     level: float = 0.01,
-    surrogates: int = 299,
+    surrogates: int = SURROGATES,
     model: Model | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
