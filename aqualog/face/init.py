@@ -130,15 +130,18 @@ class Start(Result):
         options = " ".join(more)
 
         def own(name: str) -> str:
-            return f"-o {shlex.quote(str(self.folder / name))}"
+            return shlex.quote(str(self.folder / name))
 
         if any(s.startswith("torque_") for s in self.proposals):
-            third = f"aqualog calibrate {logs} {options} {own('calibrated.toml')}"
+            third = f"aqualog calibrate {logs} {options} -o {own('calibrated.toml')}"
         elif {"a_x", *(f"omega_{w}" for w in WHEELS)} <= set(self.proposals):
-            third = f"aqualog slip-slope {logs} {options} --traction accelerometer {own('slip_slope')}"
+            third = f"aqualog slip-slope {logs} {options} --traction accelerometer -o {own('slip_slope')}"
         else:
-            third = f"aqualog convert {logs} {options} {own('drive.mf4')}"
-        return (f"aqualog doctor {logs} {options}", f"aqualog detect {logs} {options} {own('out')}", third)
+            third = f"aqualog convert {logs} {options} -o {own('drive.mf4')}"
+        second = f"aqualog detect {logs} {options} -o {own('out')}"
+        if not any(s.startswith("omega_") for s in self.proposals):  # then no detector can run
+            second = f"aqualog diagnose {logs} {options} --page {own('diagnosis.html')}"
+        return (f"aqualog doctor {logs} {options}", second, third)
 
     def text(self) -> str:
         from aqualog.report.values import NOTE, cut
