@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
+from aqualog.diagnose.any_effect import ALIKE as SAME
 from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.compete import Fitted, Posterior, fitted
@@ -87,7 +88,8 @@ def clear_forms(field: Field, found: Sets, inner: FloatArray) -> list[Clear]:
 def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
     """Shapes of the best set that no known effect replaces, what explains most first; empty if none is that clear.
 
-    Beside the conditions of `clear_forms`, a mechanism must explain 5 % of a channel's variance.
+    Beside the conditions of `clear_forms`, a mechanism must explain 5 % of a channel's variance, and no effect of the
+    library may stand for it. A load of a fifth of the car looks like a torque that goes with the torque.
     """
     clear = clear_forms(arena, posterior, posterior.tolerant)
     if not clear:
@@ -98,7 +100,7 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
         channel, share = _where(arena, c.own, fit)
         if channel is not None:
             found.append(described(arena, posterior, posterior.gram, fit, c, channel, share, seed))
-    return tuple(found)
+    return tuple(r for r in found if r.cosine <= SAME)
 
 
 def _own(arena: Arena, m: int, fit: Fitted) -> list[int]:

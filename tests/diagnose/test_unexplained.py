@@ -144,6 +144,14 @@ def test_a_hump_in_speed_is_a_force_over_speed():
     assert unknown_forms(a, p, seed=1)[0].high.tolist() == r.high.tolist()
 
 
+def test_a_form_that_a_known_effect_stands_for_is_no_unknown_one(monkeypatch):
+    a = arena(1, lambda c: hump(c["v_x"]))
+    p = compete(a)
+    for cosine, count in ((0.96, 1), (0.98, 0)):
+        monkeypatch.setattr(unexplained, "_nearest", lambda *_, c=cosine: ("torque_gain", c))
+        assert len(unknown_forms(a, p, seed=1)) == count
+
+
 def test_a_known_effect_is_no_unknown_form():
     a = arena(3, aero_drag=0.4)
     p = compete(a)
