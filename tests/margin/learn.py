@@ -1,6 +1,7 @@
 """Learn what water and dry roads show: `aqualog/detect/margin/emissions.toml`.
 
-    python -m tests.margin.learn --passes 3600 --drives 24 --keep /tmp/windows.npz
+    python -m tests.margin.learn --passes 5400 --drives 24 --keep /tmp/windows.npz
+    python -m tests.margin.learn --same-roads    # kinds of road stay as the file has them
 
 Windows come from passes whose tyres are drawn by `passes.any_tyre`, from dry drives of the tuning pool, and from drives
 on snow, ice and gravel. What is compared with is learnt from the dry road before, by the filter itself, which is told
@@ -29,7 +30,7 @@ from aqualog.model.situations import believed_vehicle, draw
 from aqualog.model.tyre import TYRES
 from aqualog.physics.hydroplaning import gallaway_speed, usf_speed
 from tests.detect.episode_study import DRY
-from tests.margin.passes import own_pass
+from tests.margin.passes import LAWS, own_pass
 
 DRIVETRAINS = ("rwd", "fwd", "awd")
 DISTANCE = (-20.0 * KMH, 100.0 * KMH)
@@ -40,13 +41,14 @@ WET = 0.6  # [-] log ratio up to which water counts as such
 STOPS_AT = 0.93  # a free wheel stops at about this share of the speed at which its contact ends
 LAW_SD = 0.20  # [-] log of a tyre's full speed about a law
 BANDWIDTH = 0.06  # [-] of the log ratio
+SHARES = (0.6, 0.1, 0.3)  # of `LAWS` (K)
 KINDS = 8  # of dry road, as many of wet, and of other surfaces
 LEAST = 1e-3  # [-] of a variance
 _N, _Z = len(state.FEATURES), state.COVARIATES
 _TAIL = FilterParams._field_defaults["tail"]
 NEUTRAL = Emissions(
-    np.zeros((NODES.size, _N, _Z)), np.tile(1e9 * np.eye(_N), (NODES.size, 1, 1)), np.ones(NODES.size),
-    np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((2, _N, _Z)), np.tile(1e9 * np.eye(_N), (2, 1, 1)),
+    np.zeros((1, NODES.size, _N, _Z)), np.tile(1e9 * np.eye(_N), (1, NODES.size, 1, 1)), np.ones((1, NODES.size)),
+    np.ones(1), np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((2, _N, _Z)), np.tile(1e9 * np.eye(_N), (2, 1, 1)),
     np.ones(2), np.array([0.0, 1.0]),
 )  # fmt: skip
 
@@ -128,17 +130,19 @@ def windows(columns, vehicle, dt, *wet):
 
 
 def of_passes(first, number):
-    """Rows of drivetrain, kind of road (0 dry, 1 water, 2 its edge, `OTHER`), log ratio, contact share, window."""
+    """Rows of drivetrain, kind of road (0 dry, 1 water, 2 its edge, `OTHER`), law of contact, log ratio, contact share,
+    window."""
     for n in range(number):
-        p = own_pass(first + n, DRIVETRAINS[n % 3], distance=DISTANCE, broad=True)
+        law = n // 3 % len(LAWS)
+        p = own_pass(first + n, DRIVETRAINS[n % 3], distance=DISTANCE, law=law)
         x = windows(p.columns, p.vehicle, p.dt, p.wet)
         contact = 0.5 * (p.columns["true_contact_fl"] + p.columns["true_contact_fr"])
         for road, times in ((1, WATER), (2, EDGE)):
             for k in (round((p.wet[0] + after) / 0.1) for after in times):
                 if k < len(x):
                     here = contact[round((0.1 * k - 0.5) / p.dt) : round((0.1 * k + 0.1) / p.dt)].mean()
-                    yield n % 3, road, np.log(p.v_full / 30.0) - x[k, _N + 1], here, *x[k]
-        yield from ((n % 3, 0, np.nan, np.nan, *row) for row in x[40 : round(p.wet[0] / 0.1) - 2 : 20])
+                    yield n % 3, road, law, np.log(p.v_full / 30.0) - x[k, _N + 1], here, *x[k]
+        yield from ((n % 3, 0, law, np.nan, np.nan, *row) for row in x[40 : round(p.wet[0] / 0.1) - 2 : 20])
 
 
 def of_drives(first, number):
@@ -147,7 +151,7 @@ def of_drives(first, number):
         drawn = draw(name, seed, TUNING_POOL)
         signals = as_signals(simulate(drawn.scenario, drawn.model), vehicle=drawn.believed)
         x = windows({s: signals.array(s) for s in signals.symbols}, drawn.believed, signals.dt_ns * 1e-9)
-        yield from ((DRIVETRAINS.index(drawn.believed.drivetrain), 0, np.nan, np.nan, *row) for row in x[30::5])
+        yield from ((DRIVETRAINS.index(drawn.believed.drivetrain), 0, 0, np.nan, np.nan, *row) for row in x[30::5])
 
 
 def of_others(first, number):
@@ -171,7 +175,7 @@ def of_others(first, number):
         start = start or k.between(1.0, 4.0)  # who starts on snow takes seconds of it for dry road
         x = windows({s: signals.array(s) for s in signals.symbols}, believed, signals.dt_ns * 1e-9, (start, 90.0))
         x = x[round(start / 0.1) + 5 :: 5]
-        yield from ((n % 3, OTHER, np.nan, np.nan, *row) for row in x if not (np.abs(row[1:3]) > GRIPS).any())
+        yield from ((n % 3, OTHER, 0, np.nan, np.nan, *row) for row in x if not (np.abs(row[1:3]) > GRIPS).any())
 
 
 def prior(rng, n=4000):
@@ -190,38 +194,52 @@ def prior(rng, n=4000):
     return found / found.sum()
 
 
+def of_law(rows):
+    """Mean, covariance and contact share at each distance, of windows of one law of contact."""
+    ratio, x = rows[:, 3], rows[:, 5:]
+    near = np.exp(-0.5 * ((ratio - NODES[:, None]) / BANDWIDTH) ** 2)
+    return *laws_of(x[:, :_N], x[:, _N:], ratio), near @ rows[:, 4] / near.sum(axis=1)
+
+
 def learn(found):
     """Emissions by drivetrain from rows of windows."""
-    found = found[np.isfinite(found[:, 4:]).all(axis=1)]
+    found = found[np.isfinite(found[:, 5:]).all(axis=1)]
     before, tables = prior(np.random.default_rng(5)), {}
     for d, drivetrain in enumerate(DRIVETRAINS):
         own = found[found[:, 0] == d]
-        road, ratio, x = own[:, 1], own[:, 2], own[:, 4:]
-        at, rng = road == 1, np.random.default_rng(1)
-        near = np.exp(-0.5 * ((ratio[at] - NODES[:, None]) / BANDWIDTH) ** 2)
+        road, law, ratio, x = own[:, 1], own[:, 2], own[:, 3], own[:, 5:]
+        rng = np.random.default_rng(1)
         wet = (road > 0) & (road < OTHER) & (ratio < WET)
         # what slips on snow slips in proportion to the traction; means of water that did so warned on a measured road
         roads = ((road == 0, 1), (wet, 1), (road == OTHER, _Z))
         kinds = [kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]
         m, S, share = (np.concatenate(k) for k in zip(*kinds, strict=True))
+        by_law = [of_law(own[(road == 1) & (law == k)]) for k in range(len(LAWS))]
         tables[drivetrain] = Emissions(
-            *laws_of(x[at, :_N], x[at, _N:], ratio[at]), near @ own[at, 3] / near.sum(axis=1), before, m, S,
-            share, np.repeat([0.0, 1.0, 2.0], KINDS),
+            *(np.array(each) for each in zip(*by_law, strict=True)), np.array(SHARES), before, m, S, share,
+            np.repeat([0.0, 1.0, 2.0], KINDS),
         )  # fmt: skip
     return tables, len(found)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, default in (("passes", 3600), ("drives", 24), ("others", 600), ("first", 100_000)):
+    for name, default in (("passes", 5400), ("drives", 24), ("others", 600), ("first", 100_000)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--keep", type=Path, default=Path("windows.npz"), help="file of windows, taken where it exists")
+    parser.add_argument("--same-roads", action="store_true", help="learn distances, and keep the file's kinds of road")
     a = parser.parse_args()
     if not a.keep.exists():
         found = (*of_passes(a.first, a.passes), *of_drives(a.first, a.drives), *of_others(a.first, a.others))
         np.savez(a.keep, x=np.array(found))
     tables, n = learn(np.load(a.keep)["x"])
-    note = f"Made by `python -m tests.margin.learn` from {n} windows."
+    if a.same_roads:
+        kept = {d: emissions.emissions_of(d) for d in tables}
+        of_roads = ("kind_mean", "kind_scatter", "kind_prior", "road")
+        tables = {d: t._replace(**{n: getattr(kept[d], n) for n in of_roads}) for d, t in tables.items()}
+    note = (
+        f"Made by `python -m tests.margin.learn` from {n:,} windows{', kinds of road before' if a.same_roads else ''}."
+    )
     target = Path(emissions.__file__).with_name("emissions.toml")
     target.write_text("\n".join(text_of(tables, note)) + "\n", encoding="utf-8")
 

@@ -27,6 +27,8 @@ V_FULL = (60.0 * KMH, 150.0 * KMH)
 V_LEAST = 50.0 * KMH
 AGAIN = (15.0 * KMH, 45.0 * KMH)  # [m/s] below full aquaplaning, of further runs of a campaign
 DT = 0.01
+# exponents of lost contact: as sources have it, early with a rest that stays for long, and late within few km/h
+LAWS = ((1.5, 6.0), (0.3, 1.5), (6.0, 20.0))
 FOREIGN_FROM = 500_000  # seeds of the other simulator, so that no number is used twice
 _SPEEDS = np.arange(30.0, 260.0, 0.25) * KMH
 
@@ -68,15 +70,16 @@ def own_full(tyre: Tyre, vehicle: Vehicle, depth: float, p: float) -> float:
     return first_stop(friction * F_z, film + (shift + vehicle.rolling_resistance) * F_z)
 
 
-def any_tyre(tyre: Tyre, rng: np.random.Generator) -> Tyre:
-    """A tyre whose laws of water, contact, drag and friction are drawn far wider than sources have them."""
+def any_tyre(tyre: Tyre, rng: np.random.Generator, exponents: tuple[float, float]) -> Tyre:
+    """A tyre whose laws of water, contact, drag and friction are drawn far wider than sources have them; `exponents`:
+    ends of that of its lost contact."""
 
     def even(low: float, high: float) -> float:
         return float(low * (high / low) ** rng.uniform())
 
     return replace(
         tyre, v_anchor=tyre.v_anchor * even(0.85, 1.15), pressure_exponent=even(0.2, 0.5), thin_gain=even(0.2, 0.9),
-        tread_gain=even(10.0, 50.0), contact_exponent=even(1.5, 6.0), wedge_arm=tyre.wedge_arm * 1.5 * rng.uniform() ** 2,
+        tread_gain=even(10.0, 50.0), contact_exponent=even(*exponents), wedge_arm=tyre.wedge_arm * 1.5 * rng.uniform() ** 2,
         h_film=even(0.15e-3, 1.0e-3), groove_relief=rng.uniform(0.2, 0.9), h_wave=even(0.8e-3, 4e-3),
         h_track=even(0.2e-3, 0.8e-3), width=tyre.width * rng.uniform(0.2, 1.4), wet_friction=rng.uniform(0.65, 0.95),
         load_sensitivity=rng.uniform(0.0, 0.3), contact_scatter=even(0.001, 0.12), scatter_length=even(0.2, 2.0),
@@ -85,13 +88,15 @@ def any_tyre(tyre: Tyre, rng: np.random.Generator) -> Tyre:
 
 
 def own_pass(
-    seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE, broad: bool = False,
+    seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE, law: int | None = None,
     run: int = 0,
 ) -> Pass:  # fmt: skip
     """A pass of the project's simulator at about one speed: tyre, pressure, water and car are drawn.
 
-    `broad`: with laws drawn by `any_tyre`, to learn from. `run`: another pass of the same tyre, water and car.
+    `law`: one of `LAWS`, with the others drawn by `any_tyre`, to learn from. `run`: another pass of the same tyre,
+    water and car.
     """
+    broad = law is not None
     rng = np.random.default_rng([seed, 79 if broad else 77])
     pool = (SCORING_POOL, TUNING_POOL)[int(rng.integers(2))]
     cars = [c for c in pool.vehicles if drivetrain in (None, c.drivetrain)]
@@ -102,7 +107,7 @@ def own_pass(
         tread = rng.uniform(1.0e-3, 8.0e-3)
         tyre = replace(TYRES["worn_summer"], tread_depth=tread, slip_slope_factor=1.03 - 0.018e3 * (tread - 1e-3),
                        width=rng.uniform(0.185, 0.235))  # fmt: skip
-        tyre = any_tyre(tyre, rng) if broad else tyre
+        tyre = tyre if law is None else any_tyre(tyre, rng, LAWS[law])
         depth, p = float(np.exp(rng.uniform(np.log(0.6e-3), np.log(6e-3)))), rng.uniform(1.8e5, 2.8e5)
         full = own_full(tyre, car, depth, p)
         v = full - away

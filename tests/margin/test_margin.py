@@ -42,11 +42,13 @@ def test_emissions_are_a_law(drivetrain):
     """Towards full aquaplaning contact falls, resistance grows and wheels shake; scatters are covariances."""
     t = emissions_of(drivetrain)
     assert (np.diff(t.contact) > 0.0).all()
-    at = t.mean @ np.array([1.0, 0.0, np.arcsinh(1.5)])  # 108 km/h, a steady car
+    usual, early, late = t.contact[:, np.argmin(np.abs(NODES - 0.3))]
+    assert early < 0.7 * usual < usual < late
+    at = t.mean[0] @ np.array([1.0, 0.0, np.arcsinh(1.5)])  # 108 km/h, a steady car
     near, far = (int(np.argmin(np.abs(NODES - x))) for x in (0.0, 0.6))
     assert (np.abs(at[near]) > np.abs(at[far]) + 0.3).all()
-    assert (np.linalg.eigvalsh(np.concatenate([t.scatter, t.kind_scatter])) > 0.0).all()
-    assert t.prior.sum() == pytest.approx(1.0, abs=1e-3)
+    assert (np.linalg.eigvalsh(np.concatenate([*t.scatter, t.kind_scatter])) > 0.0).all()
+    assert (t.prior.sum(), t.law.sum()) == pytest.approx((1.0, 1.0), abs=1e-3)
     p = params(CAR, 0.1)
     standing = Inputs(*np.zeros((9, 300_000)))
     assert scan(p, t, Filter.new(p, t), standing)[1].kinds.sum() == pytest.approx(1.0, abs=1e-6)
@@ -60,8 +62,8 @@ def test_emissions_are_those_of_these_features(drivetrain):
         p = own_pass(300 + seed, drivetrain)
         x = windows(p.columns, p.vehicle, p.dt, p.wet)[round((p.wet[0] + 2.0) / 0.1)]
         node = int(np.argmin(np.abs(np.log(p.v_full / 30.0) - x[6] - NODES)))
-        left = x[:5] - t.mean[node] @ x[5:]
-        squares.append(left @ np.linalg.solve(t.scatter[node], left))
+        left = x[:5] - t.mean[0, node] @ x[5:]
+        squares.append(left @ np.linalg.solve(t.scatter[0, node], left))
     assert np.nanmedian(squares) < CHI2_95
 
 

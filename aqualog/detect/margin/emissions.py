@@ -17,7 +17,7 @@ from aqualog.detect.margin.state import Emissions
 
 __all__ = ["emissions_of"]
 
-VERSION = 1
+VERSION = 2
 
 
 @lru_cache(maxsize=1)

@@ -182,18 +182,21 @@ def _is(t, m, road):  # type: ignore[no-untyped-def]
 
 @part
 def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
-    """Fill the probabilities of the full speeds, given that there is water."""
+    """Fill the probabilities of laws and full speeds (laws, full speeds), given that there is water."""
     best = -1e300
-    for i in range(_NV):
-        beyond = max(v - FULL_SPEEDS[i], 0.0) / p.brave
-        w[i] = m.evidence[i] - 0.5 * beyond * beyond
-        best = max(best, w[i])
+    for law in range(t.law.size):
+        for i in range(_NV):
+            beyond = max(v - FULL_SPEEDS[i], 0.0) / p.brave
+            w[law, i] = m.evidence[law, i] - 0.5 * beyond * beyond
+            best = max(best, w[law, i])
     total = 0.0
-    for i in range(_NV):
-        w[i] = t.prior[i] * math.exp(w[i] - best)
-        total += w[i]
-    for i in range(_NV):
-        w[i] /= total
+    for law in range(t.law.size):
+        for i in range(_NV):
+            w[law, i] = t.law[law] * t.prior[i] * math.exp(w[law, i] - best)
+            total += w[law, i]
+    for law in range(t.law.size):
+        for i in range(_NV):
+            w[law, i] /= total
 
 
 @partial(part, allocates=True)
@@ -215,13 +218,15 @@ def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
         m.kinds[k] /= total
     # how much drag and shake belong to a distance differs from law to law more than what is learnt
     P = m.x[1] + np.array([p.law_R**2, 0.0, 0.0, p.law_M**2, p.law_M**2])
-    nodes = np.empty(_NN)
-    for n in range(_NN):
-        nodes[n] = p.weight * _score(t.mean[n], t.scatter[n], z, m.x[0], P, p.tail, A, y)
-    keep, log_v = math.exp(-p.dt / p.keep_s), math.log(v)
-    for i in range(_NV):
-        n, a = _place(log_v, i)
-        m.evidence[i] = keep * m.evidence[i] + (1.0 - a) * nodes[n] + a * nodes[n + 1]
+    nodes = np.zeros(_NN)
+    keep, log_v, heard = math.exp(-p.dt / p.keep_s), math.log(v), _is(t, m, 1) > p.heard
+    for law in range(t.law.size):
+        if heard:
+            for n in range(_NN):
+                nodes[n] = p.weight * _score(t.mean[law, n], t.scatter[law, n], z, m.x[0], P, p.tail, A, y)
+        for i in range(_NV):
+            n, a = _place(log_v, i)
+            m.evidence[law, i] = keep * m.evidence[law, i] + (1.0 - a) * nodes[n] + a * nodes[n + 1]
 
 
 @part
@@ -250,13 +255,16 @@ def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
     edge = _LOG[0] - 0.5 * LOG_STEP
     limit = math.log(v + p.near)
     for i in range(_NV):
-        near += w[i] * min(max((limit - edge) / LOG_STEP, 0.0), 1.0)
         n, a = _place(log_at, i)
-        L += w[i] * ((1.0 - a) * t.contact[n] + a * t.contact[n + 1])
-        while q < 5 and total + w[i] >= _QUANTILES[q] and w[i] > 0.0:
-            m.out[2 + q] = math.exp(edge + LOG_STEP * (_QUANTILES[q] - total) / w[i]) - v
+        here = 0.0
+        for law in range(t.law.size):
+            here += w[law, i]
+            L += w[law, i] * ((1.0 - a) * t.contact[law, n] + a * t.contact[law, n + 1])
+        near += here * min(max((limit - edge) / LOG_STEP, 0.0), 1.0)
+        while q < 5 and total + here >= _QUANTILES[q] and here > 0.0:
+            m.out[2 + q] = math.exp(edge + LOG_STEP * (_QUANTILES[q] - total) / here) - v
             q += 1
-        total += w[i]
+        total += here
         edge += LOG_STEP
     # without a slip the distance is what was assumed before: no reason to warn
     m.out[1] = near * wet if m.x[1, 1] < _UNKNOWN else 0.0
@@ -278,7 +286,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     _copy(row, m.window[at])
     _predict(p, t, m)
     traction, more = _gather(p, m)
-    w = np.empty(_NV)
+    w = np.empty((t.law.size, _NV))
     speed = max(v, p.v_least)
     x, P = m.x[0], m.x[1]
     own, known = (x[3], x[4]), (P[3] < _UNKNOWN, P[4] < _UNKNOWN)

@@ -63,6 +63,7 @@ class FilterParams(NamedTuple):
     among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
     start: tuple[float, float, float] = (0.96, 0.02, 0.02)  # dry, wet, other; with 0.15 trailers were rain
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
+    heard: float = 1e-3  # [-] probability of water from which its distances are compared
     weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay
     law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
     law_M: float = 2.0  # [-] the same of the log variances
@@ -90,15 +91,17 @@ class Inputs(NamedTuple):
 
 
 class Emissions(NamedTuple):
-    """Mean by covariates (nodes, features, covariates) and covariance (nodes, features, features) at each distance.
+    """Mean by covariates (laws, nodes, features, covariates) and covariance (laws, nodes, features, features) at each
+    distance, by laws of lost contact with shares `law` (laws,).
 
-    `contact` (nodes,) [-] of the front axle; `prior` (full speeds,). `kind_` the same of kinds of road. `road`: 0 dry,
-    1 wet, 2 snow, ice or gravel; the shares of each sum to 1.
+    `contact` (laws, nodes) [-] of the front axle; `prior` (full speeds,). `kind_` the same of kinds of road. `road`: 0
+    dry, 1 wet, 2 snow, ice or gravel; the shares of each sum to 1.
     """
 
     mean: FloatArray
     scatter: FloatArray
     contact: FloatArray
+    law: FloatArray
     prior: FloatArray
     kind_mean: FloatArray
     kind_scatter: FloatArray
@@ -115,7 +118,7 @@ class Filter(NamedTuple):
     variance.
     """
 
-    evidence: FloatArray  # (full speeds,) log
+    evidence: FloatArray  # (laws, full speeds) log
     kinds: FloatArray  # (kinds,) probabilities of kinds of road
     R: FloatArray
     sides: FloatArray
@@ -130,7 +133,7 @@ class Filter(NamedTuple):
         """Return the state before the first sample."""
         side = np.array([0.0, 0.0, p.offset_D**2, 0.0, p.share_D**2, p.shake, p.offset_M**2])
         return Filter(
-            evidence=np.zeros(FULL_SPEEDS.size),
+            evidence=np.zeros((t.law.size, FULL_SPEEDS.size)),
             kinds=t.kind_prior * np.array(p.start)[t.road.astype(int)],
             R=np.array([0.0, 0.0, p.offset_R**2, 0.0, p.share_a**2]),
             sides=np.stack([side, side]),
