@@ -13,7 +13,9 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.evidence import Evidence, tolerant
 from aqualog.diagnose.records import Significance
 
-__all__ = ["ALIKE", "SURROGATES", "Calibration", "bonferroni", "calibrate", "chance", "gains_of", "gumbel_p", "significance"]
+__all__ = [
+    "ALIKE", "SURROGATES", "Calibration", "bonferroni", "calibrate", "chance", "gains_of", "gumbel_p", "significance",
+]  # fmt: skip
 
 # draws of noise: on 200 made drives without effect of 40 s, the level 0.05 was passed by 0.115 with 19, 0.080 with 49
 # and 0.045 with 199 (D); Gumbel's distribution of few maxima has too short a tail

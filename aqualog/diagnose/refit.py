@@ -153,9 +153,13 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
     low, high = base + evidence.low[columns], base + evidence.high[columns]
     width = PRIOR_WIDTH * evidence.prior[columns]
     J = measure.rows([s[columns] for s in evidence.signatures])  # (k, N): change of the residual by one unit
-    values = np.clip(base + start, low, high)
-    found = _try(evidence, members, names, values, measure, model)
-    if found is None:
+    for shrink in SHRINK:
+        # slip goes with one over the slip stiffness: half of it left is, by a straight line, nothing left
+        values = np.clip(base + shrink * start, low, high)
+        found = _try(evidence, members, names, values, measure, model)
+        if found is not None:
+            break
+    else:
         return None
     y, residuals, extended = found
     loss = _loss(measure, y, (values - base) / width)

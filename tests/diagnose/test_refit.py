@@ -54,6 +54,13 @@ def test_a_value_is_recovered_within_its_interval(hidden, h, true):
     assert r.model.terms[0].values[h.free[0]] == pytest.approx(r.values[0])
 
 
+def test_a_start_where_no_car_can_be_is_halved():
+    """Slip goes with one over the slip stiffness: a straight line says that nothing of it is left."""
+    evidence, start, measure = prepared([one("slip_stiffness", "rl")], term("slip_stiffness", "rl", gain=0.5))
+    assert refitted(evidence, start, measure).values[0] == pytest.approx(0.5, abs=0.02)
+    assert refitted(evidence, np.array([-0.95]), measure).values[0] == pytest.approx(0.5, abs=0.02)
+
+
 def test_sets_are_refitted_where_the_simulated_car_meets_the_measured_speed_under_the_best_one():
     load = one("payload_mass")
     evidence, *_ = prepared([load], term("payload_mass", delta_mass=900.0))
