@@ -202,12 +202,12 @@ def _explains(arena: Arena, before: Sequence[FloatArray], after: Sequence[FloatA
 
 
 def with_causes(model: Model, causes: Sequence[Cause], asked: Sequence[Hypothesis]) -> Model:
-    """The model with causes at their values."""
+    """The model with causes at their values; a road's profile has none of these, and is a term of its own."""
     found = []
     for c in causes:
         values = {n: e.value for n, e in c.parameters.items()}
         for h in asked:
-            if h.key == c.key and all(values.get(n, v) == v for n, v in h.fixed.items()):
+            if h.key == c.key and set(h.free) <= set(values) and all(values.get(n, v) == v for n, v in h.fixed.items()):
                 found.append((h, {n: values[n] for n in h.free}))
                 break
     return with_values(model, found)

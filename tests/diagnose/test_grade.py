@@ -8,9 +8,10 @@ import pytest
 from aqualog.diagnose import run
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.grade import find_profile, with_profile
-from aqualog.diagnose.hypotheses import residual
-from aqualog.diagnose.outcome import Outcome
+from aqualog.diagnose.hypotheses import Hypothesis, residual
+from aqualog.diagnose.outcome import Outcome, with_causes
 from aqualog.diagnose.records import Cause, Estimate
+from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 from tests.blind.world.cases import CARS, Hidden, Spec, clean_rows, make_case, world_of
 
@@ -125,3 +126,8 @@ def test_profile_and_mean_are_one_road(hilly):
     bias = Cause("accelerometer_bias", "a_x", {}, (), "")
     assert run._with_road(Outcome("named", (bias,)), found).causes[1].parameters == {"grade_rms": found.rms}
     assert len(open_.causes) == 3  # then it is not known whether it is the road's mean or another effect
+
+
+def test_a_profile_beside_an_unknown_form_is_no_constant_slope(hilly):
+    constant = Hypothesis(EFFECTS["road_grade"], None, ("grade",))
+    assert with_causes(Model(), [hilly[2].cause], [constant]) == Model()
