@@ -28,7 +28,8 @@ V_LEAST = 50.0 * KMH
 AGAIN = (15.0 * KMH, 45.0 * KMH)  # [m/s] below full aquaplaning, of further runs of a campaign
 DT = 0.01
 # exponents of lost contact: as sources have it, early with a rest that stays for long, and late within few km/h
-LAWS = ((1.5, 6.0), (0.3, 1.5), (6.0, 20.0))
+LAWS = ((1.5, 6.0), (0.1, 1.5), (6.0, 20.0))
+STOP_L = 0.13  # [-] contact share at which a free wheel stops
 FOREIGN_FROM = 500_000  # seeds of the other simulator, so that no number is used twice
 _SPEEDS = np.arange(30.0, 260.0, 0.25) * KMH
 
@@ -77,9 +78,13 @@ def any_tyre(tyre: Tyre, rng: np.random.Generator, exponents: tuple[float, float
     def even(low: float, high: float) -> float:
         return float(low * (high / low) ** rng.uniform())
 
+    v_anchor, pressure_exponent, thin_gain = tyre.v_anchor * even(0.85, 1.15), even(0.2, 0.5), even(0.2, 0.9)
+    tread_gain, n = even(10.0, 50.0), even(*exponents)
+    # contact that is lost early ends far beyond the speed at which a wheel stops, and that speed is to be any car's
+    v_anchor *= (1.0 - STOP_L) ** (1.0 / LAWS[0][0] - 1.0 / min(n, LAWS[0][0]))
     return replace(
-        tyre, v_anchor=tyre.v_anchor * even(0.85, 1.15), pressure_exponent=even(0.2, 0.5), thin_gain=even(0.2, 0.9),
-        tread_gain=even(10.0, 50.0), contact_exponent=even(*exponents), wedge_arm=tyre.wedge_arm * 1.5 * rng.uniform() ** 2,
+        tyre, v_anchor=v_anchor, pressure_exponent=pressure_exponent, thin_gain=thin_gain, tread_gain=tread_gain,
+        contact_exponent=n, wedge_arm=tyre.wedge_arm * 1.5 * rng.uniform() ** 2,
         h_film=even(0.15e-3, 1.0e-3), groove_relief=rng.uniform(0.2, 0.9), h_wave=even(0.8e-3, 4e-3),
         h_track=even(0.2e-3, 0.8e-3), width=tyre.width * rng.uniform(0.2, 1.4), wet_friction=rng.uniform(0.65, 0.95),
         load_sensitivity=rng.uniform(0.0, 0.3), contact_scatter=even(0.001, 0.12), scatter_length=even(0.2, 2.0),
