@@ -4,6 +4,8 @@ import numpy as np
 import polars as pl
 import pytest
 
+import aqualog as aq
+from aqualog.core.vehicle import vehicle_toml
 from tests.blind import make
 from tests.blind.injected.noise import Noise, added
 from tests.blind.plain import CAR, drive
@@ -29,6 +31,20 @@ def test_residuals_of_a_plain_drive_are_its_noise_and_a_load_shows_in_the_force_
     assert np.nanstd(calm["force"]) < 0.2
     parts = {n: detectability({n: loaded[n]}, {n: calm[n]}, {n: calm[n]}) for n in ("force", "kinematic", "slip_fl")}
     assert parts["force"] > 5.0 * max(parts["kinematic"], parts["slip_fl"])
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("of", "hidden"), [((2, "mixed", "ou1"), {}), ((20, "stop_and_go", "white"), {}), ((24,), {"aero_drag": 0.15})]
+)
+def test_a_plain_drive_has_the_hidden_cause_and_no_other(tmp_path, of, hidden):
+    drive(*of, **hidden).write_parquet(log := tmp_path / "log.parquet")
+    (car := tmp_path / "car.toml").write_text(vehicle_toml(CAR), encoding="utf-8")
+    found = aq.diagnose(log, car).document
+    assert found["verdict"] == ("named" if hidden else "no_effect")
+    for cause, (effect, size) in zip(found["causes"], hidden.items(), strict=True):
+        low, high = cause["parameters"]["delta_drag_area"]["ci95"]
+        assert (cause["effect"], low < size < high < low + 0.25 * size) == (effect, True)
 
 
 def case_of(folder, case):

@@ -126,8 +126,5 @@ def test_profile_and_mean_are_one_road(hilly):
     bias = Cause("accelerometer_bias", "a_x", {}, (), "")
     assert run._with_road(Outcome("named", (bias,)), found).causes[1].parameters == {"grade_rms": found.rms}
     assert len(open_.causes) == 3  # then it is not known whether it is the road's mean or another effect
-
-
-def test_a_profile_beside_an_unknown_form_is_no_constant_slope(hilly):
     constant = Hypothesis(EFFECTS["road_grade"], None, ("grade",))
-    assert with_causes(Model(), [hilly[2].cause], [constant]) == Model()
+    assert with_causes(Model(), [found.cause], [constant]) == Model()  # beside an unknown form: no constant slope

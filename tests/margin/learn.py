@@ -107,16 +107,20 @@ def text_of(found, note):
             yield f"{name} = {_text(x)}"
 
 
-def windows(columns, vehicle, dt, *wet):
-    """Features and covariates (steps, 8), NaN where one is missing, of a drive; `wet` [s]: spans that are not dry."""
+def inputs_of(columns, vehicle, dt):
+    """What the filter takes of a drive."""
     columns = {s: x for s, x in columns.items() if not s.startswith("true_") and np.isfinite(x).any()}
     stream = FeatureStream(vehicle, dt, columns)
     f = stream.push(columns)
     known = {s: columns[s] for s in stream.available}
-    inputs = Reader(vehicle, dt).push(Scene(f, BrakeWatch(vehicle, dt).push(f, known), known))
-    p = params(vehicle, dt)
+    return Reader(vehicle, dt).push(Scene(f, BrakeWatch(vehicle, dt).push(f, known), known))
+
+
+def windows(columns, vehicle, dt, *wet):
+    """Features and covariates (steps, 8), NaN where one is missing, of a drive; `wet` [s]: spans that are not dry."""
+    inputs, p = inputs_of(columns, vehicle, dt), params(vehicle, dt)
     now, rows = Filter.new(p, NEUTRAL), []
-    for k in range(f["v_x_hat"].size // p.block):
+    for k in range(inputs.v.size // p.block):
         at = slice(k * p.block, (k + 1) * p.block)
         is_wet = any(a - 0.1 <= k * p.dt < b + 1.0 for a, b in wet)
         now.kinds[:] = (0.0, 1.0) if is_wet else (1.0, 0.0)
@@ -236,12 +240,11 @@ def main():
         np.savez(a.keep, x=np.array(found))
     tables, n = learn(np.load(a.keep)["x"])
     if a.same_roads:
-        kept = {d: emissions.emissions_of(d) for d in tables}
         of_roads = ("kind_mean", "kind_scatter", "kind_prior", "road")
-        tables = {d: t._replace(**{n: getattr(kept[d], n) for n in of_roads}) for d, t in tables.items()}
-    note = (
-        f"Made by `python -m tests.margin.learn` from {n:,} windows{', kinds of road before' if a.same_roads else ''}."
-    )
+        file = {d: emissions.emissions_of(d) for d in tables}
+        tables = {d: t._replace(**{n: getattr(file[d], n) for n in of_roads}) for d, t in tables.items()}
+    roads = ", kinds of road from an earlier file" if a.same_roads else ""
+    note = f"Made by `python -m tests.margin.learn` from {n:,} windows{roads}."
     target = Path(emissions.__file__).with_name("emissions.toml")
     target.write_text("\n".join(text_of(tables, note)) + "\n", encoding="utf-8")
 

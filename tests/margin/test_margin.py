@@ -25,7 +25,7 @@ from aqualog.report.drive.document import document
 from aqualog.report.drive.panels import drive_rows
 from aqualog.report.drive.report import drive_report
 from tests.drives import CAR, drive, lane
-from tests.margin.learn import DRIVETRAINS, windows
+from tests.margin.learn import DRIVETRAINS, inputs_of, windows
 from tests.margin.passes import LAWS, any_tyre, own_full, own_pass
 
 KMH = 3.6
@@ -45,10 +45,11 @@ def test_emissions_are_a_law(drivetrain):
     assert (np.diff(t.contact) >= 0.0).all()
     assert (t.contact[:, -1] > t.contact[:, 0] + 0.3).all()
     usual, early, late = t.contact[:, np.argmin(np.abs(NODES - 0.3))]
-    assert early < 0.7 * usual < usual < late
-    at = np.tensordot(t.law, t.mean, 1) @ np.array([1.0, 0.0, np.arcsinh(1.5)])  # 108 km/h, a steady car
+    assert early < usual < late
+    at = t.mean @ np.array([1.0, 0.0, np.arcsinh(1.5)])  # 108 km/h, a steady car
     near, far = (int(np.argmin(np.abs(NODES - x))) for x in (0.0, 0.6))
-    assert (np.abs(at[near]) > np.abs(at[far]) + 0.3).all()
+    assert (np.abs(at[:, near]) > np.abs(at[:, far])).all()
+    assert (t.law @ (np.abs(at[:, near]) - np.abs(at[:, far])) > 0.3).all()
     assert (np.linalg.eigvalsh(np.concatenate([*t.scatter, t.kind_scatter])) > 0.0).all()
     assert (t.prior.sum(), t.law.sum()) == pytest.approx((1.0, 1.0), abs=1e-3)
     p = params(CAR, 0.1)
@@ -75,6 +76,14 @@ def test_emissions_are_those_of_these_features(drivetrain):
         left = x[:5] - t.mean[0, node] @ x[5:]
         squares.append(left @ np.linalg.solve(t.scatter[0, node], left))
     assert np.nanmedian(squares) < CHI2_95
+
+
+def test_a_mixture_of_laws_is_between_them():
+    q, t = own_pass(12, "rwd"), emissions_of("rwd")
+    p, x, k = params(q.vehicle, q.dt), inputs_of(q.columns, q.vehicle, q.dt), round((q.wet[0] + 2.0) / q.dt)
+    each = [t._replace(law=law) for law in (t.law, *np.eye(3))]
+    mixed, *alone = (scan(p, own, Filter.new(p, own), x)[0][-1, k] for own in each)
+    assert min(alone) + 0.5 < mixed < max(alone) - 0.5
 
 
 def test_a_wet_drive_has_a_distance_and_a_warning(wet):

@@ -43,8 +43,7 @@ class Outcome:
     blind: float
     slope_before: float
     slope_after: float
-    true_share_f: float  # true slope over its dry value, 4 to 9 s after the change, by axle
-    true_share_r: float
+    true_share_f: float  # true slope over its dry value, 4 to 9 s after the change, of the front axle
 
 
 def drive(seed: int, surface: str, split: float, *, excited: bool, rate: int = RATE) -> tuple[Scenario, float]:
@@ -120,7 +119,6 @@ def outcome(seed: int, surface: str, split: float, *, excited: bool, rate: int =
         slope_before=float(np.nanmedian(slope[(t > 10.0) & (t < end)])),
         slope_after=float(np.nanmedian(slope[(t > end + 4.0) & (t < end + 9.0)])) if surface != "dry" else np.nan,
         true_share_f=true_share("f"),
-        true_share_r=true_share("r"),
     )
 
 

@@ -8,28 +8,23 @@ import numpy as np
 
 __all__ = ["bootstrap", "clopper_pearson"]
 
-_DRAWS = 2000
-
 
 def clopper_pearson(hits: int, count: int, level: float = 0.95) -> tuple[float, float]:
-    """Exact interval of a share, from the beta distribution (Clopper and Pearson 1934); (0, 1) without a trial."""
-    from scipy.stats import beta
+    """Exact interval of a share (Clopper and Pearson 1934); (0, 1) without a trial."""
+    from scipy.stats import binomtest
 
-    tail = (1.0 - level) / 2.0
-    low = beta.ppf(tail, hits, count - hits + 1) if hits > 0 else 0.0
-    high = beta.ppf(1.0 - tail, hits + 1, count - hits) if hits < count else 1.0
-    return float(low), float(high)
+    found = binomtest(hits, count).proportion_ci(level, "exact") if count else (0.0, 1.0)
+    return float(found[0]), float(found[1])
 
 
 def bootstrap(
     values: Sequence[float], statistic: Callable[[np.ndarray], float], level: float = 0.95, seed: int = 1
 ) -> tuple[float, float]:
     """Percentile interval of a statistic; a case is the unit that is drawn. NaN below two values."""
-    x = np.asarray(values, dtype=float)
-    if x.size < 2:
+    from scipy import stats
+
+    if len(values) < 2:
         return float("nan"), float("nan")
-    rng = np.random.default_rng(seed)
-    drawn = [statistic(x[rng.integers(0, x.size, x.size)]) for _ in range(_DRAWS)]
-    tail = (1.0 - level) / 2.0
-    low, high = np.quantile(drawn, [tail, 1.0 - tail])
-    return float(low), float(high)
+    drawn = {"n_resamples": 2000, "vectorized": False, "method": "percentile", "rng": seed}
+    found = stats.bootstrap((np.asarray(values, dtype=float),), statistic, confidence_level=level, **drawn)
+    return float(found.confidence_interval[0]), float(found.confidence_interval[1])
