@@ -118,7 +118,7 @@ class Start(Result):
 
     @property
     def next_commands(self) -> tuple[str, ...]:
-        """The three commands that come next, with these files."""
+        """The commands that come next, with these files; only what this log has the signals for."""
         given = self.contents.drive
         folder = {p.parent for p in given.paths}
         is_folder = len(given.paths) > 1 and len(folder) == 1 and expand([str(next(iter(folder)))]) == [*given.paths]
@@ -138,10 +138,12 @@ class Start(Result):
             third = f"aqualog slip-slope {logs} {options} --traction accelerometer -o {own('slip_slope')}"
         else:
             third = f"aqualog convert {logs} {options} -o {own('drive.mf4')}"
-        second = f"aqualog detect {logs} {options} -o {own('out')}"
-        if not any(s.startswith("omega_") for s in self.proposals):  # then no detector can run
-            second = f"aqualog diagnose {logs} {options} --page {own('diagnosis.html')}"
-        return (f"aqualog doctor {logs} {options}", second, third)
+        second = []
+        if any(s.startswith("omega_") for s in self.proposals):
+            second = [f"aqualog detect {logs} {options} -o {own('out')}"]
+        elif {"v_x", "a_x"} <= set(self.proposals):
+            second = [f"aqualog diagnose {logs} {options} --page {own('diagnosis.html')}"]
+        return (f"aqualog doctor {logs} {options}", *second, third)
 
     def text(self) -> str:
         from aqualog.report.values import NOTE, cut

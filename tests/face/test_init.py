@@ -118,8 +118,9 @@ def test_what_cannot_be_known_is_asked_and_the_answers_are_in_the_files(tmp_path
 def test_without_an_answer_the_place_is_marked(tmp_path):
     start = aq.init(ev(tmp_path / "ev.csv"), tmp_path / "work", ask=lambda _: "")
     assert "torque_r" not in start.proposals
-    # no detector runs without a wheel speed, and what needs none does
     assert [c.split()[1] for c in start.next_commands] == ["doctor", "diagnose", "convert"]
+    del start.proposals["a_x"]
+    assert [c.split()[1] for c in start.next_commands] == ["doctor", "convert"]
     start.write_files()
     assert "(a driveline torque with its scale: Motor Torque [Nm])" in start.text()
     assert '# SET torque_r = { channel = "Motor Torque", scale = ... }' in (tmp_path / "work" / "map.toml").read_text()

@@ -200,7 +200,7 @@ INIT = Document(
             text("answer", "the answer; null if it is not known", null=True),
         )),
         several("set", "keys of the vehicle file that wait for a value"),
-        several("next", "the three commands that come next"),
+        several("next", "the commands that come next"),
         several("notes", "sentences on the files, and on what is missing"),
     ),
 )  # fmt: skip
