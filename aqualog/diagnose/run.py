@@ -137,7 +137,7 @@ def diagnose(
     gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
     return Diagnosis(
         verdict=outcome.verdict,
-        sentence=_sentence(outcome, found, options, untested),
+        sentence=_sentence(outcome, found, options, untested | seen.untested),
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
         used_s=sum(d.used_s for d in ready),

@@ -99,7 +99,10 @@ def verdict_sentence(
     if verdict == "no_effect":
         agrees = f"No effect: the model agrees with the measurement, at a false-alarm level of {level:g}"
         why = Counter((untested or {}).values()).most_common(1)
-        few = f"; {why[0][1]} effects were not tested ({why[0][0]})" if why and why[0][1] >= MANY_UNTESTED else ""
+        few = ""
+        if why and why[0][1] >= MANY_UNTESTED:
+            most = "" if why[0][1] == len(untested or {}) else f"{why[0][1]} of them: "
+            few = f"; {len(untested or {})} effects were not tested ({most}{why[0][0]})"
         return f"{agrees}{few}."
     if verdict == "named":
         return causes[0].sentence

@@ -38,7 +38,7 @@ def test_more_than_noise_and_nothing_large_is_one_sentence():
 
 
 @pytest.mark.parametrize(
-    ("count", "said"), [(4, "0.01."), (5, "0.01; 5 effects were not tested (no wheel torque in the log).")]
+    ("count", "said"), [(4, "0.01."), (5, "0.01; 6 effects were not tested (5 of them: no wheel torque in the log).")]
 )
 def test_no_effect_says_what_was_not_tested(count, said):
     untested = dict.fromkeys(map(str, range(count)), "no wheel torque in the log") | {

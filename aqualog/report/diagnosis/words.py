@@ -121,7 +121,7 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
         "agreement": [_agreement(a) for a in document["agreement"]],
         "unexplained": [_unexplained(r) for r in document["unexplained"]],
         "untested": [f"{upper_first(why)}: {', '.join(x)}." for why, x in untested_by_reason(document).items()],
-        "notes": list(document["notes"]),
+        "notes": [n for n in document["notes"] if n != document.get("caution")],
     }
 
 
