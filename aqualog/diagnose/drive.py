@@ -150,8 +150,10 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     if "a_x" in filled:
         bad |= _frozen(filled["a_x"], dt)
     bad |= np.abs(np.gradient(speed, dt)) > A_X_MAX
-    if "yaw_rate" in filled:
-        bad |= np.abs(v * filled["yaw_rate"]) > A_Y_MAX
+    if "yaw_rate" in filled and (cornering := np.abs(v * filled["yaw_rate"]) > A_Y_MAX).any():
+        # of a simulated car, too: one that has begun to slide shows nothing of the measured one
+        led = follow(vehicle, course, Model())
+        bad |= cornering | (np.abs(led["v_x"] * led["yaw_rate"]) > A_Y_MAX)
     # friction brakes are at every wheel: the torque of one axle cannot hold them
     every_wheel = torqued and all(f"torque_{w}" in filled for w in WHEELS)
     if "brake_pressure" in filled and not (every_wheel and brakes_in_torque(filled["brake_pressure"], torque)):

@@ -14,8 +14,9 @@ from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.full_rate import LEVEL, Kind, PerTurn, Z, per_turn, wheel_columns
+from aqualog.diagnose.isolate import POWER
 from aqualog.diagnose.outcome import Outcome
-from aqualog.diagnose.records import SURE, Cause, Estimate, Verdict
+from aqualog.diagnose.records import SURE, Cause, Estimate, Limit, Verdict
 from aqualog.diagnose.seams import seams
 from aqualog.diagnose.search import DOUBT
 from aqualog.diagnose.words import cause_sentence, place
@@ -23,7 +24,7 @@ from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 
 __all__ = [
-    "Faster", "faster", "joined", "pooled", "remarks", "to_causes", "why_untested", "with_rings", "without_known",
+    "Faster", "faster", "joined", "limits", "pooled", "remarks", "to_causes", "why_untested", "with_rings", "without_known",
 ]  # fmt: skip
 
 SHOWN = 5e-4  # smallest amplitude that is worth a remark
@@ -32,11 +33,13 @@ _RING = EFFECTS["tone_ring"]
 
 
 class Faster(NamedTuple):
-    """Causes of all drives together, sentences on what is no cause, and why an effect cannot be tested, by name."""
+    """Causes of all drives together, sentences on what is no cause, why an effect cannot be tested, by name, and the
+    detection limits of the others."""
 
     causes: tuple[Cause, ...] = ()
     notes: tuple[str, ...] = ()
     untested: dict[str, str] = {}  # noqa: RUF012 (a default that nobody changes)
+    limits: tuple[Limit, ...] = ()
 
 
 def faster(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, model: Model, *, seed: int = 1) -> Faster:
@@ -53,6 +56,7 @@ def faster(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, model: Model
         Of the permutations that calibrate the search for seams.
     """
     found = pooled([per_turn(wheel_columns(s), s.dt, s.origins) for _, s in drives])
+    sharp = limits(found)
     found = without_known(found, _known(model))
     causes = to_causes(found)
     notes = [f"Not named (probability {c.probability:.2f}): {c.sentence}" for c in causes if c.probability < SURE]
@@ -62,7 +66,7 @@ def faster(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, model: Model
         notes += [own + seam.sentence for seam in seams(s, vehicle, seed=seed)]
     reason = why_untested(found)
     named = tuple(c for c in causes if c.probability >= SURE)
-    return Faster(named, tuple(notes), {_RING.name: reason} if reason else {})
+    return Faster(named, tuple(notes), {_RING.name: reason} if reason else {}, sharp)
 
 
 def joined(outcome: Outcome, seen: Faster) -> Outcome:
@@ -123,6 +127,19 @@ def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
         sentence = cause_sentence(effect, where, parameters)
         causes.append(Cause(effect.name, where, parameters, channels, sentence, _probability(pair, value, smallest)))
     return tuple(causes)
+
+
+def limits(found: Sequence[PerTurn]) -> tuple[Limit, ...]:
+    """Amplitude of a ring that is named with a power of 0.9, of each wheel and of axles and sides with one value."""
+    p = _RING.parameters[0]
+    sd = {f.wheel: 0.5 * (f.high - f.low) / Z for f in found if f.order == 1 and f.kind != "untested"}
+    own = {w: (w,) for w in sd} | {k: v for k, v in (AXLES | SIDES).items() if all(w in sd for w in v)}
+    sure = sum(NormalDist().inv_cdf(q) for q in (SURE, POWER))
+    return tuple(
+        Limit(_RING.name, where, p.smallest + sure * math.hypot(
+            math.sqrt(sum(sd[w] ** 2 for w in wheels)) / len(wheels), DOUBT * p.smallest), p.unit, p.smallest)
+        for where, wheels in own.items()
+    )  # fmt: skip
 
 
 def _probability(wheels: Sequence[PerTurn], value: Estimate, smallest: float) -> float:

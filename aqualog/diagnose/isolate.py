@@ -15,7 +15,7 @@ from aqualog.diagnose.records import Confusion, Limit
 from aqualog.diagnose.subsets import compatible
 from aqualog.diagnose.words import listed, name_of, quantity
 
-__all__ = ["confusions", "limits", "reference_sizes", "separation"]
+__all__ = ["POWER", "confusions", "limits", "reference_sizes", "separation"]
 
 POWER = 0.9
 TOLD_APART = 0.95  # probability of naming the right one of two, from which they count as distinguished

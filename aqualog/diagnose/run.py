@@ -144,7 +144,7 @@ def diagnose(
         causes=outcome.causes,
         alternatives=outcome.alternatives,
         significance=found.significance,
-        limits=isolate.limits(evidence, sizes),
+        limits=(*isolate.limits(evidence, sizes), *seen.limits),
         confusions=isolate.confusions(evidence, found.gram, sizes, found.calibration.inflation),
         remainders=found.forms,
         manoeuvre=next_run,

@@ -242,7 +242,7 @@ _ALL = [
         (Parameter("gain", "-", 1.0, 0.4, 0.0, 5.0, 0.3, "on film and wave"),),
         _times(water_drag_gain="gain"), _WHEEL_PLACES,
         twins=("track_clearing", "contact_loss"),
-        drive=DriveSearch((_WATER, _TORQUE), tolerance=0.2),  # of each axle; of the car 15 %
+        drive=DriveSearch((_WATER, _TORQUE), tolerance=0.4),  # of each axle
         campaign=CampaignSearch(2, (None, "f", "r"), "drag of the water",
             "Film and bow wave drag {0.value:.2f} times as much on {place} " + _SPAN + " as in the model.",
         ), belongs="tyre",
@@ -417,7 +417,7 @@ _ALL = [
         (Parameter("gain", "-", 1.0, 0.3, 0.0, 5.0, 0.3, "on the lost share"),),
         _times(contact_gain="gain"), _WHEEL_PLACES,
         twins=("water_drag", "uneven_water"),
-        drive=DriveSearch((_WATER,)),
+        drive=DriveSearch((_WATER,), tolerance=0.4),
         campaign=CampaignSearch(1, (None, "f", "r"), "lost contact on water",
             "The water lifts {0.value:.2f} times as much of the contact of {place} " + _SPAN + " as in the model.",
         ), belongs="tyre",
@@ -428,7 +428,7 @@ _ALL = [
         (Parameter("delta_film", "m", 0.0, 6e-4, -5e-4, 5e-3, 2e-4, "on the tyre's own"),),
         _on_plant(lambda p, v, _: p._replace(h_track=np.maximum(p.h_track + v["delta_film"], 0.0))),
         twins=("water_drag",),
-        drive=DriveSearch((_WATER,)),
+        drive=DriveSearch((_WATER,), tolerance=1.5e-4),
         campaign=CampaignSearch(0, (None,), "film in the front wheels' track",
             "The film that the front wheels leave to the rear ones differs by {0.value:+.2f} mm "
             "(95 %: {0.low:+.2f} ... {0.high:+.2f} mm) from the tyre model's.", scale=1e3,

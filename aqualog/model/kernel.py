@@ -45,6 +45,9 @@ NO_TORQUE: FloatArray = np.zeros((1, 4))
 # a car that is followed stands where the measured one stands: a driver holds it on a slope, with a force that no log
 # has, and what a rolling start differs by would last for seconds
 SLOW, AT_REST = 3.0, 15.0  # [m/s] below it the speed is drawn harder, at rest by so many times
+# nor does a measured car spin where the simulated one has too little grip: a rear axle that slides by this angle [rad]
+# is turned back at this rate [1/s], and the car drawn to its speed
+SLIDES, TURNED_BACK = 0.1, 8.0
 
 
 class Controls(NamedTuple):
@@ -179,6 +182,12 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
     slow = max(1.0 - c.v_target / SLOW, 0.0)
     nudge = p.follow * (1.0 + AT_REST * slow * slow) * (c.v_target - y[V_X])
     _move(m, a_x, a_y, slope_down / p.mass, moment / p.I_zz, nudge, p.roll_time)
+    slide = y[V_Y] - p.l_r * y[YAW_RATE]  # of the rear axle [m/s]
+    if p.follow > 0.0 and abs(slide) > SLIDES * max(y[V_X], SLOW):
+        turning = y[V_X] * np.tan(steer) / (p.l_f + p.l_r)
+        m.f[YAW_RATE] += TURNED_BACK * (turning - y[YAW_RATE])
+        m.f[V_Y] -= TURNED_BACK * slide
+        m.f[V_X] += TURNED_BACK * (c.v_target - y[V_X])
     out = m.out
     if m.is_recorded > 0.0:
         out[AT.v_x], out[AT.a_x], out[AT.a_y], out[AT.yaw_rate] = y[V_X], a_x, a_y, y[YAW_RATE]

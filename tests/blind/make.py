@@ -72,7 +72,7 @@ def specs(kind: str, seed: int) -> Iterator[Spec]:
         k, car = i // 7, cars[i % len(cars)]
         noise = NOISES[(3 * i + i // 10) % len(NOISES)]
         if kind == "null":
-            yield Spec(EXACT_PROGRAMMES[i % 4], noise, (), 10_000 + i, car)
+            yield Spec((*EXACT_PROGRAMMES, "wet")[i % 5], noise, (), 10_000 + i, car)
         elif kind == "compound":
             yield Spec(("mixed", "handling")[i % 2], noise, COMPOUNDS[i % len(COMPOUNDS)], 10_000 + i, car)
         else:

@@ -166,8 +166,14 @@ def coverage(cases: Sequence[Judged]) -> list[Measure]:
 
 
 def forecasts(cases: Sequence[Judged]) -> list[Measure]:
-    """Metric 6: the chance to tell an effect from its nearest rival, as stated, beside whether it was named."""
-    told = [c for c in _singles(cases, STRONG) if math.isfinite(c.row.truth[0].p_right) and not c.row.error]
+    """Metric 6: the chance to tell an effect from its nearest rival, as stated, beside whether it was named.
+
+    It is stated for effects that are large enough to be found, so what is below the limit does not count.
+    """
+    told = [
+        c for c in _singles(cases, STRONG)
+        if math.isfinite(c.row.truth[0].p_right) and not c.row.error and not c.limit_is_right
+    ]  # fmt: skip
     pairs = [(c.row.truth[0].p_right, c.first_is_right) for c in told]
     return [
         _skill(6, "isolability forecast, Brier skill", pairs, 50),
