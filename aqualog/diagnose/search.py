@@ -41,7 +41,7 @@ AROUND = 2  # times that the competition is repeated around its best set
 COVERED, REFITTED = 0.98, 6  # share of the posterior that is refitted, and the most sets
 # share of the best set's gain by which the form of a water law may have misjudged another effect of water
 FORM = 0.3
-NEAR = 10.0  # [nats] behind the best set, within which a single effect is refitted
+NEAR = 10.0  # [nats] behind the best set, within which a single effect is refitted, and the rival of each of its own
 # share of what an effect shows that a channel may show more or less than in the simulator, and an interval allows (K)
 DOUBT = 0.05
 # share of what a set explains, by which a simulator of other structure errs: one more effect has to explain more (K)
@@ -253,6 +253,10 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     # one effect that two others imitate: its evidence rests on how well the simulator knows what it does
     near = linear[best] - max(NEAR, 2.0 * STRUCTURE * linear[best])
     chosen += [m for m, e in posterior.sets if len(m) == 1 < len(best) and e > near]
+    # of each effect its nearest rival, too, rather a small set: sets that differ in small members may come first
+    for name in {arena.name(b) for b in best}:
+        others = [(e - 2.0 * STRUCTURE * linear[best] * len(m), m) for m, e in posterior.sets if m and e > near]
+        chosen += [m for _, m in sorted(others, reverse=True) if all(arena.name(b) != name for b in m)][:1]
     chosen = [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m]
     measure = metric(arena, posterior.weighings, coarse=COARSE)
     led = _led(evidence, arena, posterior, model)
