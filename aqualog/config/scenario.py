@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -120,7 +120,7 @@ def load_scenario(path: Path) -> Scenario:
     _check_names(file, "", *_TABLES)
     vehicle = _vehicle(file, path.parent)
     car = vehicle or Vehicle()  # so that the rest of the file is checked too; never returned
-    tyre = _tyre(file, "tyre", car) or _own(TYRES["worn_summer"], car)
+    tyre = _tyre(file, "tyre", car) or TYRES["worn_summer"].as_fitted(car)
     _not_all(file, "tyre", ("tyre_front", "tyre_rear"))
     _not_all(file, "pressure_bar", ("pressure_front_bar", "pressure_rear_bar"))
     bar = _value(file, "pressure_bar")
@@ -266,17 +266,12 @@ def _vehicle(file: Table, base: Path) -> Vehicle | None:
         return None
 
 
-def _own(tyre: Tyre, car: Vehicle, given: Iterable[str] = ()) -> Tyre:
-    """The tyre with what the vehicle file knows of how it floats, but for what the scenario gives."""
-    return replace(tyre, **{n: w.value for n, w in car.water.items() if n not in given})  # type: ignore[arg-type]
-
-
 def _tyre(file: Table, name: str, car: Vehicle) -> Tyre | None:
     given = file.get(name)
     if given is None:
         return None
     if isinstance(given, str) and given in TYRES:
-        return _own(TYRES[given], car)
+        return TYRES[given].as_fitted(car)
     if not isinstance(given, dict):
         file.add(name, f"{name} = {repr(given)[:40]} is not one of {quoted(TYRES)}, or a table")
         return None
@@ -284,7 +279,7 @@ def _tyre(file: Table, name: str, car: Vehicle) -> Tyre | None:
     base = table.choice("base", TYRES, "worn_summer")
     values = table.numbers(TYRE_KEYS, "base")
     changed: dict[str, Any] = {"name": f"{base}, changed" if values else base, **values}
-    return _own(replace(TYRES[base], **changed), car, values)
+    return replace(TYRES[base], **changed).as_fitted(car, values)
 
 
 # --- drive

@@ -24,7 +24,8 @@ from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 
 __all__ = [
-    "Faster", "faster", "joined", "limits", "pooled", "remarks", "to_causes", "why_untested", "with_rings", "without_known",
+    "Faster", "faster", "joined", "limits", "pooled", "remarks", "to_causes", "why_untested", "with_rings",
+    "without_known",
 ]  # fmt: skip
 
 SHOWN = 5e-4  # smallest amplitude that is worth a remark

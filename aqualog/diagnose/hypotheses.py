@@ -22,18 +22,21 @@ __all__ = ["Hypothesis", "hypotheses", "residual", "signatures", "simulated", "v
 
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
 WORTH = 2.0  # tolerances
+FITTED = 0.3  # share of what laws of water differ by that is left once a law is fitted to the car's own passes (K)
 ROUGH_S = 1e-2  # [s] step that is enough for differences of simulations on dry road
 MOST_LANES = 16  # that differ from each other; of more lanes, every 16th have a deviation in common
 
 
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
-    """One effect at one place. `free` parameters are sought, `fixed` ones have these values."""
+    """One effect at one place. `free` parameters are sought, `fixed` ones have these values. `is_fitted`: the vehicle
+    file has the car's own law of water."""
 
     effect: Effect
     where: str | None
     free: tuple[str, ...]
     fixed: Mapping[str, float] = field(default_factory=dict)
+    is_fitted: bool = False
 
     @property
     def allowed(self) -> bool:
@@ -76,7 +79,8 @@ class Hypothesis:
 
     @property
     def _own_tolerance(self) -> float | None:
-        return self.effect.drive.tolerance_at.get(self.where or "", self.effect.drive.tolerance)
+        own = self.effect.drive.tolerance_at.get(self.where or "", self.effect.drive.tolerance)
+        return own * FITTED if own and self.is_fitted and self.effect.of_water else own
 
     def step(self, name: str) -> float:
         """Step of the finite difference: of the order that is expected, toward the side that has more room."""
@@ -99,6 +103,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     has: dict[Need, bool] = {"water depth": wet, "wheel torque": torque, "wheel speeds": wheels}
     has["a_x or wheel torque"] = torque or "a_x" in present
     length = max(d.duration_s for d in drives)
+    is_fitted = bool(drives[0].vehicle.water)
     out: list[Hypothesis] = []
     untested: dict[str, str] = {}
     for effect in EFFECTS.values():
@@ -116,7 +121,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         if not asked:
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
         for where in () if is_sought else asked:
-            out += [Hypothesis(effect, where, free, fixed) for fixed in effect.drive.variants(length)]
+            out += [Hypothesis(effect, where, free, fixed, is_fitted) for fixed in effect.drive.variants(length)]
     out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(() if torque else (STAND_IN,)))]
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
     # without torque there is no drag to test, nor one that differs

@@ -21,6 +21,7 @@ from aqualog.model.sensors import ESC, Channel, Group, Sensors, Truth, measure
 from aqualog.model.simulate import steering_columns
 from aqualog.model.state import DRIVE, column, resistance_at, rolling_state, wheel_columns
 from aqualog.model.term import Model, Setup
+from aqualog.model.tyre import TYRES
 from aqualog.physics.load import G
 
 __all__ = [
@@ -55,9 +56,10 @@ class Course:
 
 def setup_along(vehicle: Vehicle, course: Course, model: Model) -> Setup:
     """Return plant, sensors and road of a drive along `course`: the car of the file, perfect sensors, and all terms."""
+    tyre = TYRES["worn_summer"].as_fitted(vehicle)
     scenario = Scenario(
-        vehicle, duration_s=float(course.t[-1]), rate_hz=1.0 / float(course.t[1] - course.t[0]), lanes=course.lanes,
-        water_scatter=0.0, sensors=PERFECT,
+        vehicle, tyre, tyre, duration_s=float(course.t[-1]), rate_hz=1.0 / float(course.t[1] - course.t[0]),
+        lanes=course.lanes, water_scatter=0.0, sensors=PERFECT,
     )  # fmt: skip
     plant = build_plant(vehicle, scenario.tyre_front, scenario.tyre_rear)
     return model.apply(Setup(plant, PERFECT, scenario))

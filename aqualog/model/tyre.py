@@ -6,11 +6,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from aqualog.core.records import FloatArray
-from aqualog.core.vehicle import Key
+from aqualog.core.vehicle import Key, Vehicle
 from aqualog.physics.hydroplaning import WaterLaw, full_aquaplaning_speed
 
 __all__ = ["P_REFERENCE", "TYRES", "TYRE_KEYS", "Tyre"]
@@ -110,6 +111,10 @@ class Tyre:
             self.v_anchor, self.pressure_exponent, self.thin_gain, self.h_bulk, self.h_onset, self.tread_gain,
             self.contact_exponent,
         )  # fmt: skip
+
+    def as_fitted(self, car: Vehicle, given: Iterable[str] = ()) -> Tyre:
+        """The tyre with what the vehicle file knows of how it floats, but for the keys that are `given`."""
+        return replace(self, **{n: w.value for n, w in car.water.items() if n not in given})  # type: ignore[arg-type]
 
     def full_speed(self, h_w: FloatArray, F_z: FloatArray, *, p: float) -> FloatArray:
         """Return the speed of full aquaplaning in even water: depth [m], wheel load [N], pressure [Pa] to [m/s]."""

@@ -16,7 +16,7 @@ from aqualog.diagnose.hypotheses import residual
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
 from aqualog.model.log import as_signals
-from aqualog.model.scenario import Scenario
+from aqualog.model.scenario import Scenario, Steering
 from aqualog.model.sensors import IDEAL, Channel
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model, Term
@@ -41,7 +41,7 @@ def term(name, where=None, **values):
 
 def signals(*terms, sensors=IDEAL, seed=3, drop=(), **kw):
     """A simulated drive of 90 s with these terms in the car."""
-    scenario = Scenario(CAR, sensors=sensors, seed=seed, **({"speed": SPEED, "duration_s": 90.0} | kw))
+    scenario = Scenario(**({"vehicle": CAR, "sensors": sensors, "seed": seed, "speed": SPEED, "duration_s": 90.0} | kw))
     made = as_signals(simulate(scenario, Model(terms)), truth=False)
     return changed(made, made.frame.drop(drop))
 
@@ -53,6 +53,17 @@ def changed(log, frame):
 @cache
 def plain():
     return signals()
+
+
+def test_a_car_that_slides_in_the_simulation_alone_shows_nothing_and_comes_back():
+    """It drives out of a bend at 10 m/s²; tyres of the file's grip slide there, and the simulated car spun for good."""
+    speed = ((0.0, 18.0), (7.0, 18.0), (12.0, 36.0), (40.0, 36.0), (60.0, 25.0), (90.0, 25.0))
+    car = replace(CAR, drivetrain="rwd", mu_max=2.0)
+    log = signals(vehicle=car, speed=speed, steering=Steering(0.04, 4.0, 8.0, "lane_change"))
+    d = prepare(log, replace(car, mu_max=0.6), "a")
+    kinematic = residual(d, Model())[d.channels.index("kinematic")]
+    assert 70.0 < d.used_s < 80.0
+    assert np.abs(kinematic[d.mask]).max() < 0.1
 
 
 def test_a_dry_drive_is_used_whole():

@@ -1,5 +1,7 @@
 """Refits in the simulator: values within their intervals, bounds kept, the metric as it is defined."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -141,3 +143,20 @@ def test_the_metric_is_that_of_the_tolerant_inner_products():
     assert float(half.inner(y, y)[0, 0]) == pytest.approx(
         arena.tolerant(0.5 * arena.inner(measure.weighings))[-1, -1], rel=1e-5
     )
+
+
+def test_the_nearest_rival_of_each_effect_is_refitted(monkeypatch):
+    """Sets that differ in small members hold all of the first places, and all have the same main effect."""
+    small = [one("tyre_radius", w) for w in ("fl", "fr", "rl", "rr")]
+    small += [one("slip_stiffness", w) for w in ("fl", "fr", "rl", "rr")]
+    d = prepare(signals(term("payload_mass", delta_mass=250.0), sensors=NOISY), CAR, "a")
+    evidence = simulated([d], [one("payload_mass"), one("torque_gain"), *small], Model(), lambda _t, _s: None)
+    arena = known_only(arena_of(evidence, ()), ())
+    at = {b.key: i for i, b in enumerate(arena.blocks)}
+    mass, gain = at["payload_mass"], at["torque_gain"]
+    sets = [((mass, i), 50.0) for i in at.values() if i not in (mass, gain)] + [((gain,), 45.0)]
+    posterior = replace(compete(arena), sets=tuple(sets), probability=np.full(len(sets), 1.0 / len(sets)))
+    asked = []
+    monkeypatch.setattr(search, "refit", lambda _led, own, *_: asked.append(tuple(own)))
+    search._refitted(evidence, arena, posterior, Model())
+    assert (arena.blocks[gain].tag,) in asked
