@@ -154,9 +154,9 @@ def test_the_nearest_rival_of_each_effect_is_refitted(monkeypatch):
     arena = known_only(arena_of(evidence, ()), ())
     at = {b.key: i for i, b in enumerate(arena.blocks)}
     mass, gain = at["payload_mass"], at["torque_gain"]
-    sets = [((mass, i), 50.0) for i in at.values() if i not in (mass, gain)] + [((gain,), 45.0)]
+    sets = [((mass, i), 50.0) for i in at.values() if i not in (mass, gain)] + [((gain, at["tyre_radius@fl"]), 45.0)]
     posterior = replace(compete(arena), sets=tuple(sets), probability=np.full(len(sets), 1.0 / len(sets)))
     asked = []
     monkeypatch.setattr(search, "refit", lambda _led, own, *_: asked.append(tuple(own)))
     search._refitted(evidence, arena, posterior, Model())
-    assert (arena.blocks[gain].tag,) in asked
+    assert any(arena.blocks[gain].tag in own for own in asked)
