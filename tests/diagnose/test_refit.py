@@ -150,13 +150,13 @@ def test_the_nearest_rival_of_each_effect_is_refitted(monkeypatch):
     small = [one("tyre_radius", w) for w in ("fl", "fr", "rl", "rr")]
     small += [one("slip_stiffness", w) for w in ("fl", "fr", "rl", "rr")]
     d = prepare(signals(term("payload_mass", delta_mass=250.0), sensors=NOISY), CAR, "a")
-    evidence = simulated([d], [one("payload_mass"), one("torque_gain"), *small], Model(), lambda _t, _s: None)
+    evidence = simulated([d], [one("payload_mass"), one("aero_drag"), *small], Model(), lambda _t, _s: None)
     arena = known_only(arena_of(evidence, ()), ())
     at = {b.key: i for i, b in enumerate(arena.blocks)}
-    mass, gain = at["payload_mass"], at["torque_gain"]
-    sets = [((mass, i), 50.0) for i in at.values() if i not in (mass, gain)] + [((gain, at["tyre_radius@fl"]), 45.0)]
+    mass, drag = at["payload_mass"], at["aero_drag"]
+    sets = [((mass, i), 50.0) for i in at.values() if i not in (mass, drag)] + [((drag, at["tyre_radius@fl"]), 45.0)]
     posterior = replace(compete(arena), sets=tuple(sets), probability=np.full(len(sets), 1.0 / len(sets)))
     asked = []
     monkeypatch.setattr(search, "refit", lambda _led, own, *_: asked.append(tuple(own)))
     search._refitted(evidence, arena, posterior, Model())
-    assert any(arena.blocks[gain].tag in own for own in asked)
+    assert any(arena.blocks[drag].tag in own for own in asked)
