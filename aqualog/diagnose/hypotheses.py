@@ -22,6 +22,9 @@ __all__ = ["Hypothesis", "hypotheses", "residual", "signatures", "simulated", "v
 
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
 WORTH = 2.0  # tolerances
+# of a scale of the speed or the acceleration without wheel speeds: between ten trips of one car the slope of the one
+# over the change of the other has a standard deviation of 0.02 (D): pitching, filters, hills
+OF_CHANGES, _OF_CHANGES = 0.02, ("velocity_scale", "accelerometer_gain")
 FITTED = 0.3  # share of what laws of water differ by that is left once a law is fitted to the car's own passes (K)
 ROUGH_S = 1e-2  # [s] step that is enough for differences of simulations on dry road
 MOST_LANES = 16  # that differ from each other; of more lanes, every 16th have a deviation in common
@@ -29,14 +32,14 @@ MOST_LANES = 16  # that differ from each other; of more lanes, every 16th have a
 
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
-    """One effect at one place. `free` parameters are sought, `fixed` ones have these values. `is_fitted`: the vehicle
-    file has the car's own law of water."""
+    """One effect at one place. `free` parameters are sought, `fixed` ones have these values. `room`: tolerance in place
+    of the effect's own, where the log shows the effect less well or the vehicle file knows it better."""
 
     effect: Effect
     where: str | None
     free: tuple[str, ...]
     fixed: Mapping[str, float] = field(default_factory=dict)
-    is_fitted: bool = False
+    room: float | None = None
 
     @property
     def allowed(self) -> bool:
@@ -79,8 +82,7 @@ class Hypothesis:
 
     @property
     def _own_tolerance(self) -> float | None:
-        own = self.effect.drive.tolerance_at.get(self.where or "", self.effect.drive.tolerance)
-        return own * FITTED if own and self.is_fitted and self.effect.of_water else own
+        return self.room or self.effect.drive.tolerance_at.get(self.where or "", self.effect.drive.tolerance)
 
     def step(self, name: str) -> float:
         """Step of the finite difference: of the order that is expected, toward the side that has more room."""
@@ -103,7 +105,6 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     has: dict[Need, bool] = {"water depth": wet, "wheel torque": torque, "wheel speeds": wheels}
     has["a_x or wheel torque"] = torque or "a_x" in present
     length = max(d.duration_s for d in drives)
-    is_fitted = bool(drives[0].vehicle.water)
     out: list[Hypothesis] = []
     untested: dict[str, str] = {}
     for effect in EFFECTS.values():
@@ -121,7 +122,8 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         if not asked:
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
         for where in () if is_sought else asked:
-            out += [Hypothesis(effect, where, free, fixed, is_fitted) for fixed in effect.drive.variants(length)]
+            room = _room(effect, where, is_fitted=bool(drives[0].vehicle.water), wheels=wheels)
+            out += [Hypothesis(effect, where, free, fixed, room) for fixed in effect.drive.variants(length)]
     out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(() if torque else (STAND_IN,)))]
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
     # without torque there is no drag to test, nor one that differs
@@ -133,6 +135,13 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         if source in asked_at
     ]
     return tuple(out), untested
+
+
+def _room(effect: Effect, where: str | None, *, is_fitted: bool, wheels: bool) -> float | None:
+    """Tolerance of a law of water that is fitted to the car, and of what shows in changes of the speed alone."""
+    if effect.of_water and is_fitted and effect.drive.tolerance is not None:
+        return FITTED * effect.drive.tolerance
+    return OF_CHANGES if not wheels and effect.name in _OF_CHANGES and where in ("v_x", "a_x") else None
 
 
 def _wheel_places(effect: Effect) -> tuple[str | None, ...]:
