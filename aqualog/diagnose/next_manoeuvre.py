@@ -13,9 +13,8 @@ from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.manoeuvres import SENSORS, Run, Sensor, checks, fitting
 from aqualog.diagnose.noise import Noise
-from aqualog.diagnose.outcome import Rival
 from aqualog.diagnose.records import SURE, Manoeuvre
-from aqualog.diagnose.run_information import Case, Forecast, entropy, forecast, of_check, of_log, of_run
+from aqualog.diagnose.run_information import Case, Forecast, Rival, entropy, forecast, of_check, of_log, of_run
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.words import name_of
 from aqualog.model.term import Check, Model

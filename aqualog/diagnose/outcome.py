@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -15,44 +14,21 @@ from aqualog.diagnose.compete import Members, Posterior, fitted
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.judge import repeats
-from aqualog.diagnose.records import SURE, Alternative, Cause, Estimate, Verdict, tempered
+from aqualog.diagnose.records import SURE, Cause, Estimate, tempered
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import DOUBT, Found, Option, sharpened
 from aqualog.diagnose.threads import beside
-from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, candidates, decided, whole
+from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, Outcome, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence, name_of
 from aqualog.model.term import Model
 
-__all__ = ["Outcome", "conclude", "with_causes"]
+__all__ = ["conclude", "with_causes"]
 
 Z = 1.959964  # 97.5 % quantile of the normal distribution
 EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect explains it
 
 
-class Outcome(NamedTuple):
-    """Verdict, causes, alternatives; `chosen` is the refit that the extended model is made of, None without causes.
-
-    `certain`: effects that are there beyond doubt. `small`: sentences about deviations that are significant and too
-    small to be worth naming.
-    """
-
-    verdict: Verdict
-    causes: tuple[Cause, ...]
-    alternatives: tuple[Alternative, ...] = ()
-    chosen: Refit | None = None
-    small: tuple[str, ...] = ()
-    certain: frozenset[str] = frozenset()
-    rivals: tuple[Rival, ...] = ()
-
-
-class Rival(NamedTuple):
-    """A refitted set that remains, and its probability."""
-
-    refit: Refit
-    probability: float
-
-
-def conclude(found: Found, model: Model) -> Outcome:
+def conclude(found: Found, model: Model) -> Outcome[Option]:
     """The verdict on what a search found.
 
     An unknown form comes before any name; beside it stand the effects of the same set whose probability is 0.95 or
@@ -82,12 +58,8 @@ def conclude(found: Found, model: Model) -> Outcome:
     sets = candidates([(o, o.evidence) for o in found.options], causes_of)
     d = decided(sets, lambda group: _at_place(found, group, model), failing)
     if d.verdict == "cannot_tell" and not d.alternatives and d.best and not _is_gain(found, d.best.option.refit, model):
-        return Outcome("no_effect", (), small=d.notes)
-    notes = d.notes + (_beyond(found.arena, d.best.option) if d.best else ())
-    return Outcome(
-        d.verdict, d.causes, d.alternatives, d.best.option.refit if d.best else None, notes, d.certain,
-        tuple(Rival(s.option.refit, q) for s, q in d.rivals if s.option.refit is not None),
-    )  # fmt: skip
+        return Outcome("no_effect", notes=d.notes)
+    return d._replace(notes=d.notes + _beyond(found.arena, d.best.option)) if d.best else d
 
 
 def _beyond(arena: Arena, option: Option) -> tuple[str, ...]:

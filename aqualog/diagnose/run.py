@@ -31,12 +31,15 @@ from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, value_
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
-from aqualog.diagnose.outcome import Outcome, conclude, with_causes
-from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, ResidualView, Verdict
-from aqualog.diagnose.search import Found, Tell, search, simulated
+from aqualog.diagnose.outcome import conclude, with_causes
+from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView, Verdict
+from aqualog.diagnose.refit import Refit
+from aqualog.diagnose.run_information import Rival
+from aqualog.diagnose.search import Found, Option, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unknown_term import as_term, short_form
+from aqualog.diagnose.verdict import Outcome
 from aqualog.diagnose.words import term_words, verdict_sentence
 from aqualog.model.term import Model
 
@@ -113,12 +116,13 @@ def diagnose(
     notes += moved
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(found, model)
-    outcome, agreed = _by_drive(found, outcome, model)
-    noises = _noises(evidence, outcome)
+    chosen = outcome.best.option.refit if outcome.best else None
+    outcome, agreed = _by_drive(found, outcome, chosen, model)
+    noises = _noises(evidence, chosen)
     if road is not None:
         outcome = _with_road(outcome, road)
     is_named = any(c.effect == "road_grade" and "grade_rms" in c.parameters for c in outcome.causes)
-    extended = _extended(outcome, found, model if is_named else bare, asked)
+    extended = _extended(outcome, chosen, found.forms, model if is_named else bare, asked)
     names = {d.name for d in ready}
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
     outcome = joined(outcome, seen)
@@ -128,11 +132,12 @@ def diagnose(
     after = before if extended.terms == bare.terms else [_led(d, extended) for d in ready]
     differs, is_unclear = extended.terms != bare.terms, outcome.verdict == "cannot_tell"
     tell("searching for a run that distinguishes the causes" if is_unclear else "measuring the gain", 0.8)
+    rivals = [Rival(s.option.refit, q) for s, q in outcome.rivals if s.option.refit is not None]
     last: list[Callable[[], Any]] = []
     if differs:
         last.append(lambda: _gained(ready, holdout, vehicle, bare, extended, noises[0], options))
     if is_unclear:
-        last.append(lambda: next_manoeuvre(evidence, outcome.rivals, noises, model))
+        last.append(lambda: next_manoeuvre(evidence, rivals, noises, model))
     done = beside(lambda f: f(), last) if len(last) > 1 else [f() for f in last]
     gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
     return Diagnosis(
@@ -152,7 +157,7 @@ def diagnose(
         model=with_rings(extended, seen),
         channels=ready[0].channels,
         untested=untested | seen.untested,
-        notes=(*notes, *_unnamed(outcome, found, options), *outcome.small, *seen.notes),
+        notes=(*notes, *_unnamed(outcome, found, options), *outcome.notes, *seen.notes),
         views=_views(ready, before, after) if options.views else (),
         agreement=agreed if outcome.causes else (),
         caution=not_calibrated(vehicle),
@@ -201,13 +206,13 @@ def _moved(moved: Model, model: Model) -> tuple[str, ...]:
     )  # fmt: skip
 
 
-def _noises(evidence: Evidence, outcome: Outcome) -> list[Noise]:
+def _noises(evidence: Evidence, chosen: Refit | None) -> list[Noise]:
     """Noise of each drive after the chosen set."""
-    quiet = evidence.residuals if outcome.chosen is None else outcome.chosen.residuals
+    quiet = evidence.residuals if chosen is None else chosen.residuals
     return [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, evidence.drives, strict=True)]
 
 
-def _sentence(outcome: Outcome, found: Found, options: Options, untested: Mapping[str, str]) -> str:
+def _sentence(outcome: Outcome[Option], found: Found, options: Options, untested: Mapping[str, str]) -> str:
     reason = f" ({short_form(found.forms[0])})" if found.forms else ""
     p = found.significance.p_value
     return verdict_sentence(
@@ -233,9 +238,10 @@ def _gained(
     )  # fmt: skip
 
 
-def _by_drive(found: Found, outcome: Outcome, model: Model) -> tuple[Outcome, tuple[Agreement, ...]]:
+def _by_drive(
+    found: Found, outcome: Outcome[Option], r: Refit | None, model: Model
+) -> tuple[Outcome[Option], tuple[Agreement, ...]]:
     """Values of the chosen set drive by drive; intervals grow where the drives differ."""
-    r = outcome.chosen
     if r is None:
         return outcome, ()
     agreed = agreements(found, r, np.array([value_in(model, r.members[i], n) for i, n in r.names]))
@@ -248,7 +254,7 @@ def _led(drive: Drive, model: Model) -> FloatArray:
     return residual(led_by(drive, model), model)
 
 
-def _with_road(outcome: Outcome, road: Profile) -> Outcome:
+def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
     cause, own = road.cause, outcome.causes
     if not road.is_large or cause.probability < SURE:
         sure = cause.probability >= SURE
@@ -258,7 +264,7 @@ def _with_road(outcome: Outcome, road: Profile) -> Outcome:
             else f"Probability {cause.probability:.2f}, not named"
         )
         note = f"{note}: {cause.sentence}"
-        return outcome._replace(small=(*outcome.small, note))
+        return outcome._replace(notes=(*outcome.notes, note))
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
         # one road: a constant slope is its mean, whose interval knows that it is an offset as well
         own = tuple(c for c in own if c.effect != cause.effect)
@@ -277,26 +283,28 @@ def _without_road(extended: Model, given: Model) -> Model:
     return Model(tuple(t for t in extended.terms if id(t) in own or t.effect.name != "unexplained_grade"))
 
 
-def _unnamed(outcome: Outcome, found: Found, options: Options) -> tuple[str, ...]:
+def _unnamed(outcome: Outcome[Option], found: Found, options: Options) -> tuple[str, ...]:
     p = found.significance.p_value
     if outcome.verdict != "no_effect" or p > options.level:
         return ()
     return (f"The test found more than noise (p = {p:.2g}), but no effect large enough to be worth naming.",)
 
 
-def _extended(outcome: Outcome, found: Found, model: Model, asked: Sequence[Hypothesis]) -> Model:
+def _extended(
+    outcome: Outcome[Option], best: Refit | None, forms: Sequence[Remainder], model: Model, asked: Sequence[Hypothesis]
+) -> Model:
     extended = model
     named = {c.key for c in outcome.causes}
     if outcome.verdict == "unexplained":
         extended = with_causes(model, [c for c in outcome.causes if c.key in {h.key for h in asked}], asked)
-    if (best := outcome.chosen) is not None:
+    if best is not None:
         # effects too small to be named are not put into the model either
         extended = with_values(model, [
             (h, {n: v for (i, n), v in zip(best.names, best.values.tolist(), strict=True) if best.members[i] is h})
             for h in best.members
             if h.key in named
         ])  # fmt: skip
-    terms = [as_term(r) for r in found.forms]
+    terms = [as_term(r) for r in forms]
     for term in terms:
         if term is not None and all(t.effect is not term.effect for t in extended.terms):
             extended = extended.with_term(term)

@@ -9,8 +9,9 @@ from aqualog.diagnose import run
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.grade import find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, residual
-from aqualog.diagnose.outcome import Outcome, with_causes
+from aqualog.diagnose.outcome import with_causes
 from aqualog.diagnose.records import Cause, Estimate
+from aqualog.diagnose.verdict import Outcome
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 from tests.blind.world.cases import CARS, Hidden, Spec, clean_rows, make_case, world_of
@@ -101,7 +102,7 @@ def test_a_road_too_small_to_be_named_is_a_note(hilly):
     small = replace(found, rms=Estimate(0.01, 0.009, 0.011, "rad"))
     silent = run._with_road(Outcome("no_effect", ()), small)
     assert (silent.verdict, silent.causes) == ("no_effect", ())
-    assert "too small to be worth naming" in silent.small[0]
+    assert "too small to be worth naming" in silent.notes[0]
     assert run._with_road(Outcome("no_effect", ()), found).verdict == "named"
 
 

@@ -13,7 +13,7 @@ from aqualog.diagnose.campaign.refit import Refit, estimates
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.hypotheses import value_in
 from aqualog.diagnose.records import Cause, Estimate
-from aqualog.diagnose.verdict import PLACES, Candidate, Decision, candidates, decided, whole
+from aqualog.diagnose.verdict import PLACES, Candidate, Outcome, candidates, decided, whole
 from aqualog.model.term import Effect, Model
 
 __all__ = ["cause_sentence", "conclude"]
@@ -25,13 +25,13 @@ _PLACES = {
 }  # fmt: skip
 
 
-def conclude(found: Found, passes: Passes, given: Model, *, seed: int) -> Decision[Option]:
+def conclude(found: Found, passes: Passes, given: Model, *, seed: int) -> Outcome[Option]:
     """The verdict on what a competition found.
 
     An unknown form comes before any name. A name needs a gain on runs that were not fitted.
     """
     if found.forms:
-        return Decision("unexplained")
+        return Outcome("unexplained")
 
     def failing(best: Candidate[Option]) -> tuple[str, ...]:
         won = gain(passes, best.option.refit, found.nothing, found.scatter, seed=seed)

@@ -24,7 +24,7 @@ from aqualog.diagnose.campaign.refit import settled
 from aqualog.diagnose.hypotheses import with_values
 from aqualog.diagnose.records import Diagnosis, Gain, ResidualView
 from aqualog.diagnose.unknown_term import short_form
-from aqualog.diagnose.verdict import Decision
+from aqualog.diagnose.verdict import Outcome
 from aqualog.diagnose.words import verdict_sentence
 from aqualog.model.term import Model
 
@@ -114,7 +114,7 @@ def _not_testable(data: CampaignData, passes: Passes, given: Model, wet: int) ->
 
 
 def _diagnosed(
-    data: CampaignData, passes: Passes, found: Found, d: Decision[Option], won: Gain | None, level: float
+    data: CampaignData, passes: Passes, found: Found, d: Outcome[Option], won: Gain | None, level: float
 ) -> Diagnosis:
     evidence, c, p = found.evidence, found.calibration, found.significance.p_value
     after = d.best.option.refit if d.best is not None and d.verdict != "cannot_tell" else found.nothing
