@@ -16,7 +16,6 @@ from aqualog.diagnose.any_effect import SURROGATES
 from aqualog.diagnose.campaign.advice import advice
 from aqualog.diagnose.campaign.catalogue import hypotheses, untested
 from aqualog.diagnose.campaign.compete import Found, Option, compete
-from aqualog.diagnose.campaign.gain import gain
 from aqualog.diagnose.campaign.observe import passes_of
 from aqualog.diagnose.campaign.outcome import conclude
 from aqualog.diagnose.campaign.passes import RESISTANCE, Passes, doubted, steady
@@ -97,11 +96,7 @@ def diagnose_campaign(
             passes = kept
             found = found_in(passes)._replace(significance=found.significance)
     say("gain on runs left out")
-    decision = conclude(found, passes, given, seed=seed)
-    won = None
-    if decision.best is not None:
-        won = gain(passes, decision.best.option.refit, found.nothing, found.scatter, seed=seed)
-    return _diagnosed(data, passes, found, decision, won, level)
+    return _diagnosed(data, passes, found, *conclude(found, passes, given, seed=seed), level)
 
 
 def _not_testable(data: CampaignData, passes: Passes, given: Model, wet: int) -> Diagnosis:
