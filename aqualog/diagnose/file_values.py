@@ -11,6 +11,7 @@ from aqualog.core.notation import AXLES
 from aqualog.core.provenance import provenance_of, uncertainty
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.diagnose.words import listed
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 
@@ -86,11 +87,10 @@ def not_calibrated(vehicle: Vehicle) -> str:
     keys = calibrated_enough(vehicle)
     if not keys:
         return ""
-    listed = " and ".join(filter(None, (", ".join(keys[:-1]), keys[-1])))
     known = (
         "" if provenance_of(vehicle, "mass").source == "measured" else ", best with the weighed mass (--fix mass=...)"
     )
-    doubt = f"{listed} {'is a guess' if len(keys) == 1 else 'are guesses'}"
+    doubt = f"{listed(keys)} {'is a guess' if len(keys) == 1 else 'are guesses'}"
     if not vehicle.provenance:
         doubt = "it does not say where its values come from, so they count as exact"
     return f"This vehicle file was not calibrated: {doubt}; run `aqualog calibrate` on four or more dry drives{known}."

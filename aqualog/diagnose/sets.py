@@ -12,7 +12,7 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.competition import SCALES, Block, Packed, State, added, packed, scored, scores, start, values
 
 __all__ = [
-    "Fitted", "Grouped", "MayJoin", "Members", "Sets", "evidence_of", "first_of", "fitted_in", "grouped", "ranked",
+    "Fitted", "MayJoin", "Members", "Sets", "evidence_of", "first_of", "fitted_in", "ranked",
     "searched", "shares",
 ]  # fmt: skip
 
@@ -53,14 +53,6 @@ class Fitted:
     covariance: FloatArray
 
 
-@dataclass(frozen=True, slots=True)
-class Grouped:
-    """Sets (indices) with the same names together, the most probable first, and the share of each name."""
-
-    groups: tuple[tuple[int, ...], ...]
-    marginal: Mapping[str, float]
-
-
 def fitted_in(blocks: Sequence[Block], inner: FloatArray, members: Sequence[int]) -> Fitted:
     """Values of all columns of a set together, from inner products (K + 1, K + 1) whose last row is the residual."""
     state = start(inner)
@@ -99,18 +91,6 @@ def shares(evidence: Sequence[float]) -> FloatArray:
     z = np.array(evidence)
     p = np.exp(z - z.max())
     return np.asarray(p / p.sum())
-
-
-def grouped(names: Sequence[frozenset[str]], share: Sequence[float]) -> Grouped:
-    """Sets whose names are the same count together."""
-    groups: dict[frozenset[str], list[int]] = {}
-    marginal: dict[str, float] = {}
-    for i, (own, q) in enumerate(zip(names, share, strict=True)):
-        groups.setdefault(own, []).append(i)
-        for n in own:
-            marginal[n] = marginal.get(n, 0.0) + q
-    order = sorted(groups.values(), key=lambda g: -sum(share[i] for i in g))
-    return Grouped(tuple(tuple(g) for g in order), marginal)
 
 
 def first_of(

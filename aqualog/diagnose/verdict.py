@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Generic, NamedTuple, TypeVar
 
 from aqualog.diagnose.records import SURE, Alternative, Cause, Verdict, tempered
-from aqualog.diagnose.sets import grouped, shares
+from aqualog.diagnose.sets import shares
 from aqualog.diagnose.threads import beside
 
 __all__ = ["CREDIBLE", "PLACES", "Candidate", "Outcome", "candidates", "decided", "whole"]
@@ -90,12 +90,16 @@ def decided(
     failing : callable
         What speaks against naming a set's causes.
     """
-    together = grouped([s.names for s in sets], [s.share for s in sets])
-    ranked = [[sets[i] for i in g] for g in together.groups]
+    groups: dict[frozenset[str], list[Candidate[Option]]] = {}
+    marginal: dict[str, float] = {}
+    for s in sets:
+        groups.setdefault(s.names, []).append(s)
+        marginal.update({n: marginal.get(n, 0.0) + s.share for n in s.names})
+    ranked = sorted(groups.values(), key=lambda g: -sum(s.share for s in g))
     if not ranked or not ranked[0][0].names:
         return Outcome("no_effect", notes=_small(ranked[0][0]) if ranked else ())
     best, group = pick(ranked[0]), tuple(ranked[0])
-    own = _with_probability(best.large, together.marginal)
+    own = _with_probability(best.large, marginal)
     notes = _small(best) + _other_places(best, group)
     failed = failing(best)
     unsure = frozenset(c.effect for c in own if c.probability < SURE)
@@ -112,7 +116,7 @@ def decided(
     for g, picked in zip(rest, beside(pick, rest), strict=True):
         ratio = math.exp(min(max(group[0].evidence - g[0].evidence, 0.0), 700.0))
         rivals.append((picked, sum(s.share for s in g)))
-        others.append(Alternative(_with_probability(picked.large, together.marginal), ratio))
+        others.append(Alternative(_with_probability(picked.large, marginal), ratio))
     certain = frozenset() if failed else best.names - unsure
     # the best set whole, one effect at two places too; of the others what it does not have
     more = {c.effect: c for a in reversed(others) for c in a.causes if c.effect not in best.names}
