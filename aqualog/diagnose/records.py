@@ -269,17 +269,17 @@ class Diagnosis:
     drives: tuple[str, ...]
     duration_s: float
     used_s: float
-    causes: tuple[Cause, ...]
-    alternatives: tuple[Alternative, ...]
-    significance: Significance | None
-    limits: tuple[Limit, ...]
-    confusions: tuple[Confusion, ...]
-    remainders: tuple[Remainder, ...]
-    manoeuvre: Manoeuvre | None
-    gain: Gain | None
     model: Model
     channels: tuple[str, ...]
-    untested: Mapping[str, str]
+    causes: tuple[Cause, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
+    significance: Significance | None = None
+    limits: tuple[Limit, ...] = ()
+    confusions: tuple[Confusion, ...] = ()
+    remainders: tuple[Remainder, ...] = ()
+    manoeuvre: Manoeuvre | None = None
+    gain: Gain | None = None
+    untested: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     views: tuple[ResidualView, ...] = field(default=(), repr=False)
     agreement: tuple[Agreement, ...] = ()

@@ -371,9 +371,8 @@ def _not_testable(
     drives: Sequence[Drive], model: Model, reason: str, notes: tuple[str, ...], vehicle: Vehicle
 ) -> Diagnosis:
     return Diagnosis(
-        "not_testable", verdict_sentence("not_testable", (), level=0.0, reason=reason), tuple(d.name for d in drives),
-        sum(d.duration_s for d in drives), sum(d.used_s for d in drives), (), (), None, (), (), (), None, None, model,
-        drives[0].channels, {}, notes, caution=not_calibrated(vehicle),
+        "not_testable", f"Not testable: {reason}.", tuple(d.name for d in drives), sum(d.duration_s for d in drives),
+        sum(d.used_s for d in drives), model, drives[0].channels, notes=notes, caution=not_calibrated(vehicle),
     )  # fmt: skip
 
 
