@@ -12,9 +12,8 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import contrasts
-from aqualog.diagnose.day_to_day import as_value, day_to_day, kind_of
 from aqualog.diagnose.drive import Drive
-from aqualog.diagnose.file_values import deviation
+from aqualog.diagnose.file_values import as_value, day_to_day, deviation, kind_of
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.spectrum import weighing
 from aqualog.model.term import Kind, Model

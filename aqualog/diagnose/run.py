@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from aqualog.checks.follows import Follow
+from aqualog.checks.follows import Follow, follow
 from aqualog.core.errors import SignalError
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
@@ -20,7 +20,6 @@ from aqualog.diagnose.arena import KNOWN_PRIOR
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
-from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
 from aqualog.diagnose.evidence import Evidence, recentred
 from aqualog.diagnose.faster import faster, joined, with_rings
@@ -43,9 +42,12 @@ from aqualog.diagnose.verdict import Outcome
 from aqualog.diagnose.words import term_words, verdict_sentence
 from aqualog.model.term import Model
 
-__all__ = ["Options", "diagnose"]
+__all__ = ["Options", "accelerometer_defect", "diagnose"]
 
 LEAST_USED_S = 20.0
+LEAST_CORRELATION = 0.5
+LEAST_GAIN, MOST_GAIN = 0.5, 1.5  # bounds of an accelerometer's gain
+LEAST_MOTION = 0.1  # [m/s^2] sd of the change of the acceleration
 SAME = 0.2  # of what a signal changes by from sample to sample, a difference that is rounding
 # of twice the log-likelihood that an effect must gain to be more likely than none: its prior, and what its freedom
 # costs in the competition (2.5 nats (natural logarithm), typical of 300 s)
@@ -346,6 +348,24 @@ def _is_same(a: Drive, b: Drive) -> bool:
         float(np.std(a.columns[s][:n] - b.columns[s][:n])) <= SAME * float(np.std(np.diff(a.columns[s][:n])))
         for s in a.present & b.present
     )
+
+
+def accelerometer_defect(drive: Drive) -> Follow | None:
+    """Whether `a_x` is the car's longitudinal acceleration: its changes over 2 s against those of dv/dt.
+
+    None if it is, or if the speed changes too little for a judgement.
+    """
+    if "a_x" not in drive.columns:
+        return None
+    used = np.repeat(drive.mask, max(1, round(0.1 / drive.dt)) if drive.dt < 0.1 else 1)
+    # not the course's target: it leads the simulation of a car that is heavier than its file by more than the speed
+    a, v = drive.columns["a_x"], drive.speed
+    n = min(used.size, a.size)
+    found = follow(a[:n], v[:n], used[:n], drive.dt)
+    if found is None or found.motion < LEAST_MOTION:
+        return None
+    wrong = found.correlation < LEAST_CORRELATION or not LEAST_GAIN <= found.gain <= MOST_GAIN
+    return found if wrong else None
 
 
 def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> str:

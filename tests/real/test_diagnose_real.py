@@ -14,11 +14,10 @@ from aqualog.calibrate.run import calibrate
 from aqualog.cli.main import app
 from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
-from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.grade import find_profile, with_profile
 from aqualog.diagnose.hypotheses import residual
-from aqualog.diagnose.run import Options, diagnose
+from aqualog.diagnose.run import Options, accelerometer_defect, diagnose
 from aqualog.model.term import Model
 
 HERE = Path(__file__).parent
