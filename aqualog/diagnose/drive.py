@@ -16,17 +16,21 @@ from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.units import is_unit, parse_unit
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import block_means, block_step, centre_line_speeds, channels_of
-from aqualog.diagnose.inputs import SPEED_S, confirmed_torque, quiet_speed, quiet_torque, smooth
-from aqualog.diagnose.unlogged import (
+from aqualog.diagnose.inputs import (
     A_MOST,
     BRAKE_PRESSURE,
     LEAST_S,
+    SPEED_S,
     V_MIN,
     brakes_in_torque,
     brakes_unlogged,
+    confirmed_torque,
     needed_torque,
+    quiet_speed,
+    quiet_torque,
     road_wheel_angle,
     roll_out,
+    smooth,
 )
 from aqualog.features.stream import INPUTS, FeatureStream
 from aqualog.model.effects import EFFECTS

@@ -10,24 +10,8 @@ from aqualog.core.records import FloatArray
 from aqualog.model.term import Model
 
 __all__ = [
-    "AGREES",
-    "SURE",
-    "Agreement",
-    "Alternative",
-    "ByDrive",
-    "Cause",
-    "ChannelGain",
-    "Confusion",
-    "Consequence",
-    "Diagnosis",
-    "Estimate",
-    "Gain",
-    "Limit",
-    "Manoeuvre",
-    "Remainder",
-    "ResidualView",
-    "Significance",
-    "Verdict",
+    "AGREES", "SURE", "Agreement", "Alternative", "ByDrive", "Cause", "ChannelGain", "Confusion", "Consequence",
+    "Diagnosis", "Estimate", "Gain", "Limit", "Manoeuvre", "Remainder", "ResidualView", "Significance", "Verdict",
     "tempered",
 ]  # fmt: skip
 
