@@ -86,24 +86,12 @@ def contrasts(channels: tuple[str, ...]) -> FloatArray:
 def channel_values(
     columns: Mapping[str, FloatArray], channels: tuple[str, ...], vehicle: Vehicle, *, dt: float
 ) -> FloatArray:
-    """Channels of signals as means over blocks of 0.1 s.
+    """Channels of signals as means over blocks of 0.1 s. (C, m), NaN where a signal is missing
 
-    Parameters
-    ----------
-    columns : mapping of array (n,)
-        Canonical signals; of a simulation also `nudge_seen`, the acceleration that drew its speed to the measured one.
-    channels : tuple of str
-        Of `CHANNELS`.
-    vehicle : Vehicle
-        Radii and distances by which wheels are compared: the file's, for both sides.
-    dt : float
-        Step of the signals. [s]
-
-    Returns
-    -------
-    values : array (C, m)
-        NaN where a signal is missing. `force_balance` is the accelerometer itself: the part that the torque explains is
-        on the simulated side. ISO 8855 signs [iso8855_2011].
+    `columns` (n,) at the step `dt` [s]: canonical signals; of a simulation also `nudge_seen`, the acceleration that
+    drew its speed to the measured one. `vehicle`: radii and distances by which wheels are compared, the file's for both
+    sides. `force_balance` is the accelerometer itself: the part that the torque explains is on the simulated side. ISO
+    8855 signs [iso8855_2011].
     """
     mean = {n: block_means(x, dt) for n, x in columns.items()}
     step = block_step(dt)

@@ -42,26 +42,13 @@ A_ON_LANE = 0.8  # [m/s^2]
 
 
 def consequences(vehicle: Vehicle, model: Model, *, seed: int = 1) -> tuple[Consequence, ...]:
-    """Detectors on simulated drives of the extended model, without and with it.
+    """Detectors on simulated drives of a model, without and with it: one for each of `DETECTORS` that could run.
 
     The car of the model makes the drives of `DRY` and passes the water of `PASSES`: 1.3 mm under worn tyres, after 15 s
-    of dry road. Each drive is judged with the vehicle file alone and with the model in it.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-    model : Model
-        Terms of the simulated car, which the second judgement also knows.
-    seed : int
-        Of roads, weather, drivers and sensors, >= 0.
-
-    Returns
-    -------
-    tuple of Consequence
-        One per detector of `DETECTORS` that could run. A pass counts if a wheel floats, and as found if an event begins
-        on its water no later than 2 s after that; the latencies are means over the passes found both times, None
-        without any. An event outside of water and of the second after it is a false alarm; `distance_km` is the
-        distance driven outside of them.
+    of dry road. Each drive is judged with the vehicle file alone and with the model in it. A pass counts if a wheel
+    floats, and as found if an event begins on its water no later than 2 s after that. The latencies are means over the
+    passes found both times, None without any. An event outside of water and of the second after it is a false alarm;
+    `distance_km` is the distance driven outside of them. `seed` >= 0 of roads, weather, drivers and sensors.
 
     Raises
     ------

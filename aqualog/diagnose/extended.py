@@ -45,26 +45,15 @@ class Extended(NamedTuple):
 
 
 def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extended:
-    """Signals and vehicle for the detectors, with the terms of a model taken into account.
+    """Signals as loaded with `vehicle`, and vehicle, for the detectors, with the terms of a model taken into account.
 
     Each term acts on the simulation of the dry car of the vehicle file; the changed values are read back. Terms for
     which the vehicle file has a key change the vehicle: mass and its position, drag area, rolling resistance (with
     dragging brakes), inertias, radii, slip slopes. Other terms change the signals. A sensor's error is removed. A wheel
     whose radius differs from its axle's is converted to that radius. A force that slows the car (wind, trailer, cold
     tyres, curves) is added to the accelerometer, which then shows the car without it. Such a force is a slow change of
-    about 0.1 m/s², which the velocity observer learns as an offset anyway.
-
-    Parameters
-    ----------
-    signals : Signals
-        As loaded with `vehicle`.
-    vehicle : Vehicle
-    model : Model
-
-    Returns
-    -------
-    Extended
-        The given objects themselves if the model has no terms or only neutral ones.
+    about 0.1 m/s², which the velocity observer learns as an offset anyway. The given objects themselves if the model
+    has no terms or only neutral ones.
 
     Raises
     ------

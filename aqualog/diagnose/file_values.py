@@ -124,17 +124,9 @@ def kind_of(h: Hypothesis, name: str) -> Kind:
 
 
 def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:
-    """Standard deviation of the day-to-day differences of its kind and of the file's own values, expressed as a value
-    of this parameter, in its unit.
+    """Day-to-day differences of its kind and errors of the file, as a standard deviation of one of its parameters.
 
-    Parameters
-    ----------
-    h : Hypothesis
-    name : str
-        One of its free parameters.
-    vehicle : Vehicle
-    speed : float
-        At which its drag counts. [m/s]
+    In the parameter's unit; `speed`: at which its drag counts [m/s].
     """
     row = h.parameter(name).day_to_day
     own = deviation(h, name, vehicle)

@@ -51,22 +51,11 @@ def measured_gain(
     in_sample: bool,
     consequences: tuple[Consequence, ...] = (),
 ) -> Gain:
-    """Error and log score with one model and the other.
+    """Error and log score with one model and the other, on drives with the channels that the noise was fitted on.
 
-    Parameters
-    ----------
-    drives : sequence of Drive
-        With the channels that the noise was fitted on.
-    before, after : Model
-    noise : Noise
-        Of the diagnosed drive after its best set: one measure for both models.
-    seed : int
-        Of the bootstrap.
-    in_sample : bool
-        Whether these are the diagnosed drives themselves.
-    consequences : tuple of Consequence
-
-    The channel `speed` is the error of a simulation that runs free for half a minute [m/s].
+    `noise`: of the diagnosed drive after its best set, one measure for both models; `seed` of the bootstrap;
+    `in_sample`: these are the diagnosed drives themselves. The channel `speed` is the error of a simulation that runs
+    free for half a minute [m/s].
     """
     masks, names = [d.mask for d in drives], tuple(d.name for d in drives)
     # each model has its own target speed with which it meets the measured speed

@@ -114,18 +114,9 @@ def with_profile(model: Model, profile: Profile) -> Model:
 def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
     """The slope of the road along a drive, or None if the drive does not show one.
 
-    Parameters
-    ----------
-    drive : Drive
-    residual : array (C, n)
-        Of the drive's channels under the model at hand [m/s²].
-
-    Returns
-    -------
-    profile : Profile or None
-        With torque: the part that both channels share, beyond chance and beyond 0.5 % rms. Without torque: only if a
-        second pass shows the same profile, or beyond 2 % rms. Errors of mass, delays, scales and clocks follow the
-        acceleration and are removed from both channels first.
+    `residual` (C, n): of the drive's channels under the model at hand [m/s²]. With torque: the part that both channels
+    share, beyond chance and beyond 0.5 % rms. Without torque: only if a second pass shows the same profile, or beyond 2
+    % rms. Errors of mass, delays, scales and clocks follow the acceleration and are removed from both channels first.
     """
     if "kinematic" not in drive.channels:
         return None

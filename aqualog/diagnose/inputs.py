@@ -64,19 +64,11 @@ def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
 
 
 def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
-    """A signal after Wiener's filter [wiener1949]: each frequency weighted by its share above the white noise.
+    """A signal (n,) after Wiener's filter [wiener1949]: each frequency weighted by its share above the white noise.
 
     The noise is estimated in a band well above the frequencies of drivers' actions. A signal sampled too slowly for
-    that stays unchanged. Zero phase: no delay.
-
-    Parameters
-    ----------
-    x : array (n,)
-    dt : float
-        Step of the grid. [s]
-    rate_hz : float, optional
-        Rate of the signal on the bus if it is slower than the grid. Linear interpolation between its samples has less
-        noise at high frequencies. [Hz]
+    that stays unchanged. Zero phase: no delay. `dt`: step of the grid [s]; `rate_hz`: of the signal on the bus, if it
+    is slower than the grid, since linear interpolation between its samples has less noise at high frequencies.
     """
     rate = min(rate_hz or 1.0 / dt, 1.0 / dt)
     low, high = (max(share * rate, least) for share, least in zip(TORQUE_BAND, LEAST_BAND_HZ, strict=True))
@@ -149,27 +141,15 @@ def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) ->
 
 
 def confirmed_torque(torque: FloatArray, a: FloatArray, dt: float, per_torque: float) -> FloatArray:
-    """Wheel torques with each frequency weighted by the share that the car's acceleration confirms.
+    """Wheel torques (4, n) [N·m] with each frequency weighted by the share that the car's acceleration confirms.
 
     The noise of a real torque has a colour: within the frequencies of drivers, the torque alone does not show it. But
     it does not accelerate the car. The cross spectrum of torque and acceleration, over the power of the torque, is the
     share of torque in it, which is the weight of Wiener's filter [wiener1949].
 
-    Parameters
-    ----------
-    torque : array (4, n)
-        [N·m]
-    a : array (n,)
-        Measured acceleration, finite; its own noise does not matter. [m/s²]
-    dt : float
-        [s]
-    per_torque : float
-        Acceleration per torque of the car of the file, which is compared at low frequencies only. [m/s²/(N·m)]
-
-    Returns
-    -------
-    torque : array (4, n)
-        Unchanged if the drive is too short or steady to show it.
+    `a` (n,): measured acceleration, finite, whose own noise does not matter [m/s²]; `per_torque`: acceleration per
+    torque of the car of the file, compared at low frequencies only [m/s²/(N·m)]. Unchanged if the drive is too short or
+    steady to show it.
     """
     n, size = a.size, round(SEGMENT_S / dt)
     if n < 4 * size:

@@ -120,14 +120,8 @@ def forecast(case: Case, log: FloatArray, run: FloatArray, times: int, group: Fl
     data are drawn under each set in the space that all rows span, and each set's density gives the posterior. Of log
     and run a share of the likelihood counts, as in the verdict.
 
-    Parameters
-    ----------
-    case : Case
-    log, run : array (N, N)
-        Inner products of the rows of `of_log` and `of_run` or `of_check`.
-    times : int
-    group : array (S, S)
-        1 where a set (row) has the effects of a group (column): such sets are one cause.
+    `log`, `run` (N, N): inner products of the rows of `of_log`, and of `of_run` or `of_check`; `group` (S, S): 1 where
+    a set (row) has the effects of a group (column), since such sets are one cause.
     """
     size, turn = np.linalg.eigh(run * times)
     seen = size > 1e-9 * max(float(size[-1]), 1e-9)

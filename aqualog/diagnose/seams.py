@@ -89,16 +89,9 @@ class _Step(NamedTuple):
 def seams(signals: Signals, vehicle: Vehicle, *, seed: int = 1) -> tuple[Seam, ...]:
     """Jumps of the clock of accelerometer, wheels, reference velocity or torque, first ones first.
 
-    Parameters
-    ----------
-    signals : Signals
-        At the log's own rate.
-    vehicle : Vehicle
-        Radii only: a wrong gain does not matter.
-    seed : int
-        Of the permutations of windows that calibrate the test.
-
-    Limits: two jumps of one signal within half a minute are one; without acceleration there is nothing to see.
+    `signals` at the log's own rate; of the vehicle the radii only, a wrong gain does not matter; `seed` of the
+    permutations of windows that calibrate the test. Limits: two jumps of one signal within half a minute are one;
+    without acceleration there is nothing to see.
     """
     sources = _sources(signals, vehicle)
     slowness = _slowness(signals, vehicle)

@@ -114,15 +114,8 @@ def searched(
 ) -> dict[Members, float]:  # fmt: skip
     """Evidence of the sets that are visited: the best ones of each size carried on, then members exchanged.
 
-    Parameters
-    ----------
-    blocks : sequence of Block
-    inner : array (K + 1, K + 1)
-        Inner products of all columns, the residual last.
-    may_join : callable
-        Whether a block may join the set of a state.
-    width : int
-        Sets that are carried on.
+    `inner` (K + 1, K + 1): inner products of all columns, the residual last; `may_join`: whether a block may join the
+    set of a state; `width`: sets that are carried on.
     """
 
     together = packed(blocks)

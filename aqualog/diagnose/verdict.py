@@ -80,15 +80,8 @@ def decided(
     """The verdict on sets without an unknown form.
 
     A name needs a probability of 0.95. Else the answer is what the posterior consists of, up to 0.95. Sets whose causes
-    worth naming are the same count together.
-
-    Parameters
-    ----------
-    sets : sequence of Candidate
-    pick : callable
-        Which one of a group that differs in places only stands for it.
-    failing : callable
-        What speaks against naming a set's causes.
+    worth naming are the same count together: `pick` says which one of a group that differs in places only stands for
+    it, `failing` what speaks against naming a set's causes.
     """
     groups: dict[frozenset[str], list[Candidate[Option]]] = {}
     marginal: dict[str, float] = {}
