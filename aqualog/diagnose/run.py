@@ -114,8 +114,8 @@ def diagnose(
         return _not_testable(ready, model, reason, notes, vehicle)
     if model.terms:
         ready = [led_by(d, model) for d in ready]
-    ready, model, bare, road, asked, untested, evidence, moved = _simulated(ready, model, tell)
-    notes += moved
+    evidence, model, bare, road, untested, moved = _simulated(ready, model, tell)
+    ready, notes = list(evidence.drives), notes + moved
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(found, model)
     chosen = outcome.best.option.refit if outcome.best else None
@@ -124,7 +124,7 @@ def diagnose(
     if road is not None:
         outcome = _with_road(outcome, road)
     is_named = any(c.effect == "road_grade" and "grade_rms" in c.parameters for c in outcome.causes)
-    extended = _extended(outcome, chosen, found.forms, model if is_named else bare, asked)
+    extended = _extended(outcome, chosen, found.forms, model if is_named else bare, evidence.asked)
     names = {d.name for d in ready}
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
     outcome = joined(outcome, seen)
@@ -167,15 +167,13 @@ def diagnose(
 
 
 class _Setting(NamedTuple):
-    """Drives with the model that the search starts from, and what it asks: `bare` is the model without the road."""
+    """What the search starts from: `bare` is the model without the road."""
 
-    ready: list[Drive]
+    evidence: Evidence
     model: Model
     bare: Model
     road: Profile | None
-    asked: tuple[Hypothesis, ...]
     untested: dict[str, str]
-    evidence: Evidence
     notes: tuple[str, ...]
 
 
@@ -192,20 +190,12 @@ def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
     evidence = simulated(ready, asked, model, tell)
     moved = recentred(evidence, model)
     if moved != model:
-        notes = _moved(moved, model)
-        bare = Model((*bare.terms, *(t for t in moved.terms if t not in model.terms)))
-        model, ready = moved, [led_by(d, moved) for d in ready]
+        new = tuple(t for t in moved.terms if t not in model.terms)
+        notes = tuple(f"The vehicle file is not sure of it, and the drives move it: {term_words(t)}." for t in new)
+        model, bare = moved, Model((*bare.terms, *new))
+        ready = [led_by(d, model) for d in ready]
         evidence = simulated(ready, asked, model, tell)
-    evidence = supported(around_water(evidence, model))
-    return _Setting(list(evidence.drives), model, bare, road, evidence.asked, untested, evidence, notes)
-
-
-def _moved(moved: Model, model: Model) -> tuple[str, ...]:
-    """A note on each value of the vehicle file that the drives moved."""
-    terms = (t for t in moved.terms if t not in model.terms)
-    return tuple(
-        f"The vehicle file is not sure of it, and the drives move it: {term_words(t)}." for t in terms
-    )  # fmt: skip
+    return _Setting(supported(around_water(evidence, model)), model, bare, road, untested, notes)
 
 
 def _noises(evidence: Evidence, chosen: Refit | None) -> list[Noise]:

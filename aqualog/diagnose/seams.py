@@ -294,7 +294,7 @@ def _named(steps: Sequence[_Step], sources: Sequence[str]) -> list[Seam]:
             s for s in left
             if s.first <= surest.last + NEAR_S and s.last >= surest.first - NEAR_S and set(s.pair) & set(surest.pair)
         ]  # fmt: skip
-        score = {s: _score(group, s) for s in sources}
+        score = {s: sum(s in step.pair for step in group) for s in sources}
         names = tuple(s for s in sources if score[s] == max(score.values()))
         if len(names) > 1:
             names, group = surest.pair, [surest]
@@ -304,7 +304,3 @@ def _named(steps: Sequence[_Step], sources: Sequence[str]) -> list[Seam]:
         out.append(Seam(placed.t, (placed.first, placed.last), size, names, surest.p))
         left = [s for s in left if s not in group]
     return out
-
-
-def _score(group: Sequence[_Step], source: str) -> int:
-    return sum(source in s.pair for s in group)

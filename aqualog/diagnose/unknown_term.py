@@ -98,8 +98,6 @@ _COORDINATES: dict[str, tuple[str, str]] = {
     "t": ("time", "s"),
     "water_depth": ("water depth", "m"),
     "ambient_temperature": ("air temperature", "K"),
-    "slip": ("slip", "-"),
-    "drive_sign": ("driving or braking", "-"),
     "steer_angle": ("steer angle", "rad"),
     "yaw_rate": ("yaw rate", "rad/s"),
     "since_braking": ("time since braking", "s"),
