@@ -77,26 +77,11 @@ def diagnose(
     options: Options | None = None,
     progress: Tell | None = None,
 ) -> Diagnosis:
-    """Errors of the model on these drives, with their causes.
+    """Errors of the model on drives, each with its name, with their causes. The same for the same input and seed.
 
-    Parameters
-    ----------
-    drives : sequence of (name, Signals)
-        Measured with the same car in the same state; each has a noise of its own.
-    vehicle : Vehicle
-        The car as described in its vehicle file.
-    model : Model, optional
-        Terms that are known already.
-    holdout : sequence of (name, Signals)
-        Drives that are used only for the gain.
-    options : Options, optional
-    progress : callable, optional
-        Called with the name of the step and the share that is done.
-
-    Returns
-    -------
-    Diagnosis
-        The same for the same input and seed.
+    The drives were measured with the same car in the same state; each has a noise of its own. `model`: terms that are
+    known already; `holdout`: drives that are used only for the gain. `progress` gets the name of each step and the
+    share that is done.
 
     Raises
     ------

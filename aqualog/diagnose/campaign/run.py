@@ -37,26 +37,12 @@ def diagnose_campaign(
     options: Options | None = None,
     progress: Callable[[str], None] = lambda _what: None,
 ) -> Diagnosis:
-    """Name the errors of the tyre and water model over a campaign.
-
-    Parameters
-    ----------
-    data : CampaignData
-        Its results (`aqualog.campaign.results.load_results`).
-    model : Model, optional
-        Terms that are known already.
-    options : Options, optional
-    progress : callable
-        Called with the name of each step.
-
-    Returns
-    -------
-    Diagnosis
-        Channels `slip_slope_<wheel>` and `resistance`. `duration_s`: driving on water of all runs; `used_s`: the part
-        that was used.
+    """Name the errors of the tyre and water model over a campaign, from its results; `model`: terms that are known
+    already.
 
     A run is the independent unit throughout: each is one vector of means, its slips and resistance on water minus those
-    on dry road. It is compared with the model's expectation at the driven speed and traction.
+    on dry road. It is compared with the model's expectation at the driven speed and traction. Channels are
+    `slip_slope_<wheel>` and `resistance`. `duration_s`: driving on water of all runs; `used_s`: the part that was used.
     """
     o, given = options or Options(), model or Model()
     progress("reading the runs")
