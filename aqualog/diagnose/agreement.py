@@ -26,16 +26,9 @@ __all__ = ["agreements", "widened"]
 def agreements(found: Found, r: Refit, base: FloatArray) -> tuple[Agreement, ...]:
     """One agreement for each value of the refitted set; empty for a single drive.
 
-    Parameters
-    ----------
-    found : Found
-    r : Refit
-        Its signatures at its values apply to every drive.
-    base : array (k,)
-        Values without the effects.
-
-    Uses the linear model at the set's values: no drive is simulated again. Tolerances count for each drive separately,
-    as if the file had a different error in each.
+    `r`: its signatures at its values apply to every drive; `base` (k,): values without the effects. Uses the linear
+    model at the set's values: no drive is simulated again. Tolerances count for each drive separately, as if the file
+    had a different error in each.
     """
     evidence = found.arena.evidence
     drives = [evidence.drives[p.drive] for p in found.arena.parts]

@@ -53,21 +53,12 @@ def gains_of(evidence: Evidence, gram: FloatArray) -> FloatArray:
 
 
 def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: float, seed: int) -> Calibration:
-    """Null distribution of the largest gain.
+    """Null distribution of the largest gain, from `surrogates` draws; of none Bonferroni's bound [bonferroni1936].
 
     The residuals are whitened, so noise alone makes the columns' inner products with them normal, with the columns' own
     inner products as covariance. A surrogate [theiler1992] is one draw of normal numbers, as many as there are columns.
-
-    Parameters
-    ----------
-    evidence : Evidence
-    plain : array (K + 1, K + 1)
-        Inner products without tolerances. They also show which hypotheses are alike, so that one test covers them.
-    surrogates : int
-        Number of draws. 0: Bonferroni's bound [bonferroni1936] applies.
-    level : float
-        Share of logs without effect that may be reported as having one.
-    seed : int
+    `plain` (K + 1, K + 1): inner products without tolerances, which also show what hypotheses are alike, so that one
+    test covers them. `level`: share of logs without effect that may be reported as having one.
     """
     sizes = _sizes(evidence)
     groups = _groups(evidence, plain)

@@ -24,24 +24,24 @@ BLOCK_S = 0.1  # [s] keeps what is slower than 5 Hz; faster motion comes from sp
 
 
 class Kind(NamedTuple):
-    """Title and unit of a channel for the page, and a description of what it compares."""
+    """Title and unit of a channel for the page."""
 
     title: str
     unit: str
-    meaning: str
 
 
-_SLIP = "rim speed of the wheel on the centre line, minus the reference velocity"
+# accelerometer against torque and resistance, and against the acceleration of the wheels or the velocity; rim speeds on
+# the centre line against the velocity or each other; a_y against v_x times yaw rate; rods against the wheel's forces
 CHANNELS: dict[str, Kind] = {
-    "force_balance": Kind("Force balance", "m/s^2", "accelerometer against torque and resistance"),
-    "kinematic": Kind("Kinematic", "m/s^2", "accelerometer against the acceleration of the wheels or the velocity"),
-    **{f"slip_{w}": Kind(f"Slip {w}", "m/s", _SLIP) for w in WHEELS},
-    "axle_slip": Kind("Slip between axles", "m/s", "rim speed of the driven axle minus that of the other axle"),
-    "side_slip_f": Kind("Slip between front wheels", "m/s", "rim speed left minus right, corrected for curves"),
-    "side_slip_r": Kind("Slip between rear wheels", "m/s", "rim speed left minus right, corrected for curves"),
-    "lateral": Kind("Lateral", "m/s^2", "lateral accelerometer against v_x times yaw rate"),
-    "tie_rod_fl": Kind("Tie rod left", "N", "tie-rod force against the forces of the front wheel"),
-    "tie_rod_fr": Kind("Tie rod right", "N", "tie-rod force against the forces of the front wheel"),
+    "force_balance": Kind("Force balance", "m/s^2"),
+    "kinematic": Kind("Kinematic", "m/s^2"),
+    **{f"slip_{w}": Kind(f"Slip {w}", "m/s") for w in WHEELS},
+    "axle_slip": Kind("Slip between axles", "m/s"),
+    "side_slip_f": Kind("Slip between front wheels", "m/s"),
+    "side_slip_r": Kind("Slip between rear wheels", "m/s"),
+    "lateral": Kind("Lateral", "m/s^2"),
+    "tie_rod_fl": Kind("Tie rod left", "N"),
+    "tie_rod_fr": Kind("Tie rod right", "N"),
 }
 
 
@@ -86,24 +86,12 @@ def contrasts(channels: tuple[str, ...]) -> FloatArray:
 def channel_values(
     columns: Mapping[str, FloatArray], channels: tuple[str, ...], vehicle: Vehicle, *, dt: float
 ) -> FloatArray:
-    """Channels of signals as means over blocks of 0.1 s.
+    """Channels of signals as means over blocks of 0.1 s. (C, m), NaN where a signal is missing
 
-    Parameters
-    ----------
-    columns : mapping of array (n,)
-        Canonical signals; of a simulation also `nudge_seen`, the acceleration that drew its speed to the measured one.
-    channels : tuple of str
-        Of `CHANNELS`.
-    vehicle : Vehicle
-        Radii and distances by which wheels are compared: the file's, for both sides.
-    dt : float
-        Step of the signals. [s]
-
-    Returns
-    -------
-    values : array (C, m)
-        NaN where a signal is missing. `force_balance` is the accelerometer itself: the part that the torque explains is
-        on the simulated side. ISO 8855 signs [iso8855_2011].
+    `columns` (n,) at the step `dt` [s]: canonical signals; of a simulation also `nudge_seen`, the acceleration that
+    drew its speed to the measured one. `vehicle`: radii and distances by which wheels are compared, the file's for both
+    sides. `force_balance` is the accelerometer itself: the part that the torque explains is on the simulated side. ISO
+    8855 signs [iso8855_2011].
     """
     mean = {n: block_means(x, dt) for n, x in columns.items()}
     step = block_step(dt)

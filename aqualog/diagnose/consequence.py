@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from aqualog.core.records import DriveResult, Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.stream import detect_drive
 from aqualog.diagnose.extended import extended_inputs
 from aqualog.diagnose.records import Consequence
 from aqualog.diagnose.threads import beside
-from aqualog.evaluate.drives import labels_in
-from aqualog.evaluate.judge import LIMITS_S, beginning_in, hits
-from aqualog.evaluate.labels import Labels, Span, joined, without
+from aqualog.evaluate.drives import Drive, labels_in
+from aqualog.evaluate.judge import judge
+from aqualog.evaluate.labels import Label, Labels
+from aqualog.evaluate.records import RunRecord
 from aqualog.model.drawing import KMH, TUNING_POOL, Drawing, full_speed
 from aqualog.model.log import as_signals
 from aqualog.model.scenario import Lane, Profile, Scenario
@@ -42,38 +41,14 @@ APPROACH_S, ON_LANE_S, RUN_OUT_S = 15.0, 3.0, 5.0
 A_ON_LANE = 0.8  # [m/s^2]
 
 
-class _Seen(NamedTuple):
-    """One detector on one drive: false alarms, and the latency of its pass: NaN if not found; None without a pass."""
-
-    false_alarms: int
-    latency_s: float | None
-
-
-def consequences(
-    vehicle: Vehicle, model: Model, *, seed: int = 1, progress: Callable[[str], None] = lambda _: None
-) -> tuple[Consequence, ...]:
-    """Detectors on simulated drives of the extended model, without and with it.
+def consequences(vehicle: Vehicle, model: Model, *, seed: int = 1) -> tuple[Consequence, ...]:
+    """Detectors on simulated drives of a model, without and with it: one for each of `DETECTORS` that could run.
 
     The car of the model makes the drives of `DRY` and passes the water of `PASSES`: 1.3 mm under worn tyres, after 15 s
-    of dry road. Each drive is judged with the vehicle file alone and with the model in it.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-    model : Model
-        Terms of the simulated car, which the second judgement also knows.
-    seed : int
-        Of roads, weather, drivers and sensors, >= 0.
-    progress : callable
-        Called with the name of each step.
-
-    Returns
-    -------
-    tuple of Consequence
-        One per detector of `DETECTORS` that could run. A pass counts if a wheel floats, and as found if an event begins
-        on its water no later than 2 s after that; the latencies are means over the passes found both times, None
-        without any. An event outside of water and of the second after it is a false alarm; `distance_km` is the
-        distance driven outside of them.
+    of dry road. Each drive is judged with the vehicle file alone and with the model in it. A pass counts if a wheel
+    floats, and as found if an event begins on its water no later than 2 s after that. The latencies are means over the
+    passes found both times, None without any. An event outside of water and of the second after it is a false alarm;
+    `distance_km` is the distance driven outside of them. `seed` >= 0 of roads, weather, drivers and sensors.
 
     Raises
     ------
@@ -81,84 +56,38 @@ def consequences(
         If the car cannot drive with the terms of the model.
     """
 
-    def one(numbered: tuple[int, Scenario]) -> _Pair:
-        number, scenario = numbered
-        progress(f"drive {number} of {len(DRY) + len(PASSES)} with the extended model")
+    def one(scenario: Scenario) -> tuple[RunRecord, RunRecord]:
         # twice the usual step of a simulation: half the time, the same alarms
         signals = as_signals(simulate(scenario, model, dt=2e-3), vehicle=vehicle)
-        return _both(signals, vehicle, model, labels_in(signals))
+        extended, labels = extended_inputs(signals, vehicle, model), _of_one_pass(labels_in(signals))
+        known = (signals, vehicle), (extended.signals, extended.vehicle)
+        before, after = (judge(Drive("", s, v, labels)) for s, v in known)
+        return before, after
 
-    return _summed(beside(one, enumerate(_scenarios(vehicle, seed), 1)))
-
-
-class _Pair(NamedTuple):
-    """Both judgements of one drive, by detector that ran in both, and the dry distance [m]."""
-
-    before: dict[str, _Seen]
-    after: dict[str, _Seen]
-    metres: float
+    seen = beside(one, _scenarios(vehicle, seed))
+    return tuple(_summed(d, own) for d in DETECTORS if (own := [p for p in seen if all(d in r.detectors for r in p)]))
 
 
-def _both(signals: Signals, vehicle: Vehicle, model: Model, labels: Labels | None) -> _Pair:
-    extended = extended_inputs(signals, vehicle, model)
-    plain = detect_drive(signals, vehicle)
-    informed = detect_drive(extended.signals, extended.vehicle)
-    t = signals.array("t")
-    water = labels.water_widened if labels is not None else []
-    dry = without([(float(t[0]), float(t[-1]) + signals.dt)], water)
-    return _Pair(_look(plain, labels, dry), _look(informed, labels, dry), _metres(plain, dry))
+def _of_one_pass(labels: Labels | None) -> Labels:
+    """The labels with one episode from the first to the last wheel that floats, however many they are."""
+    if labels is None:
+        return Labels((), frozenset(), "")
+    water = tuple(Label(a, b, "water") for a, b in labels.water)
+    episode = (Label(labels.afloat[0][0], labels.afloat[-1][1], "partial"),) if labels.afloat else ()
+    return replace(labels, items=water + episode)
 
 
-def _look(result: DriveResult, labels: Labels | None, dry: Sequence[Span]) -> dict[str, _Seen]:
-    off = {u.detector for u in result.unavailable}
-    floating = labels.afloat if labels is not None else []
-    out = {}
-    for detector in DETECTORS:
-        if detector in off:
-            continue
-        events = joined(((e.start_s, e.end_s) for e in result.events if e.detector == detector), 0.0)
-        latency = None
-        if labels is not None and floating:
-            episode = (floating[0][0], floating[-1][1])
-            hit = hits([episode], events, limit=LIMITS_S["partial"], water=labels.water)[0]
-            latency = hit.latency if hit.found else float("nan")
-        out[detector] = _Seen(len(beginning_in(events, dry)), latency)
-    return out
-
-
-def _metres(result: DriveResult, dry: Sequence[Span]) -> float:
-    t = result.signals.array("t")
-    v = result.features["v_x_hat"].to_numpy() if "v_x_hat" in result.features.columns else np.zeros(t.size)
-    is_dry = np.any([(t >= a) & (t < b) for a, b in dry], axis=0) if dry else np.zeros(t.size, dtype=bool)
-    return float(np.nansum(v[is_dry]) * result.signals.dt)
-
-
-def _summed(seen: Sequence[_Pair]) -> tuple[Consequence, ...]:
-    out = []
-    for detector in DETECTORS:
-        pairs = [(s.before[detector], s.after[detector], s.metres) for s in seen if detector in s.before]
-        if not pairs:
-            continue
-        passes = [
-            (b.latency_s, a.latency_s) for b, a, _ in pairs if b.latency_s is not None and a.latency_s is not None
-        ]
-        both = np.array([x for x in passes if np.isfinite(x).all()])
-        found = np.isfinite(np.array(passes)).sum(axis=0) if passes else (0, 0)
-        latency = both.mean(axis=0) if both.size else None
-        out.append(
-            Consequence(
-                detector=detector,
-                false_alarms_before=sum(b.false_alarms for b, _, _ in pairs),
-                false_alarms_after=sum(a.false_alarms for _, a, _ in pairs),
-                distance_km=sum(m for _, _, m in pairs) / 1e3,
-                latency_before_s=None if latency is None else float(latency[0]),
-                latency_after_s=None if latency is None else float(latency[1]),
-                found_before=int(found[0]),
-                found_after=int(found[1]),
-                passes=len(passes),
-            )
-        )
-    return tuple(out)
+def _summed(detector: str, pairs: Sequence[tuple[RunRecord, RunRecord]]) -> Consequence:
+    runs = [tuple(r.detectors[detector] for r in p) for p in pairs]
+    hits = [tuple(r.partial[0] for r in p) for p in runs if p[0].partial]
+    latencies = np.array([[h.latency for h in p] for p in hits if all(h.found for h in p)])
+    latency = latencies.mean(axis=0).tolist() if latencies.size else (None, None)
+    found = [sum(p[i].found for p in hits) for i in range(2)]
+    alarms = [sum(len(p[i].false_alarms) for p in runs) for i in range(2)]
+    metres = sum(before.dry_m for before, _ in pairs)
+    return Consequence(
+        detector, alarms[0], alarms[1], metres / 1e3, latency[0], latency[1], found[0], found[1], len(hits)
+    )  # fmt: skip
 
 
 def _scenarios(vehicle: Vehicle, seed: int) -> Iterable[Scenario]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -15,26 +15,30 @@ from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.units import is_unit, parse_unit
 from aqualog.core.vehicle import Vehicle
-from aqualog.diagnose.channels import block_means, block_step, channels_of
-from aqualog.diagnose.floating import floating
-from aqualog.diagnose.inputs import SPEED_S, confirmed_torque, quiet_speed, quiet_torque, smooth
-from aqualog.diagnose.unlogged import (
+from aqualog.diagnose.channels import block_means, block_step, centre_line_speeds, channels_of
+from aqualog.diagnose.inputs import (
     A_MOST,
     BRAKE_PRESSURE,
     LEAST_S,
+    SPEED_S,
     V_MIN,
     brakes_in_torque,
     brakes_unlogged,
+    confirmed_torque,
     needed_torque,
+    quiet_speed,
+    quiet_torque,
     road_wheel_angle,
     roll_out,
+    smooth,
 )
 from aqualog.features.stream import INPUTS, FeatureStream
+from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import FOLLOW_RATE, Course, follow
 from aqualog.model.scenario import Lane
-from aqualog.model.term import Model
+from aqualog.model.term import Model, Term
 
-__all__ = ["Drive", "led_by", "prepare", "rolling_under", "stretches"]
+__all__ = ["RESERVED", "Drive", "floating", "led_by", "prepare", "rolling_under", "stretches"]
 
 BESIDE_S = 1.0  # [s] before and after what is left out
 BEHIND_S = 1.0  # [s] after a stretch of water, in which the rear axle and the speed still have it
@@ -47,6 +51,17 @@ JERK_MAX, JERK_S = 10.0, 0.1
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
 BRAKES, LONG_AGO_S = -0.8, 60.0  # [m/s^2], [s] braking, and when it has been long ago
 ROLLS_OUT = 0.15  # [m/s^2] a slope of 1.5 %, so that a road does not count as a brake
+# slip of a wheel beyond its grip: a wet tyre's force has its largest value at 0.08 to 0.2 (D: 3 mu / C), and driving
+# without floating needs a fifth of that
+BEYOND_GRIP = 0.05
+# times its own lost contact with which the simulation must still hold on: it goes with the fourth power of the speed of
+# full aquaplaning, which sources give as 118 (thesis), 95 (PAVDRN, K) and 88 km/h (Gallaway, K) at 1.3 mm
+RESERVE = 2.0
+# [s] a wheel that stood takes up speed again within one (D: 33 m/s in 0.65 s), but the led car has been turned by it,
+# nobody steers it back, and its yaw dies out in a few
+RECOVERY_S = 5.0
+RESERVED = (Model(), Model((Term(EFFECTS["contact_loss"], {"gain": RESERVE}),)))
+V_LEAST = 4.0  # [m/s] under the slip
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,3 +378,34 @@ def stretches(drive: Drive) -> npt.NDArray[np.int64]:
     late = np.convolve(wet.astype(np.float64), np.ones(k + 1), "full")[: wet.size] > 0.5
     begins = np.diff(late.astype(np.int64), prepend=0) > 0
     return np.where(late, np.cumsum(begins), 0)
+
+
+def floating(
+    columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, course: Course,
+    models: Sequence[Model] = RESERVED,
+) -> BoolArray:  # fmt: skip
+    """Samples (n,) in which a wheel may float, and whose residual is not judged; all False on a dry course.
+
+    A wheel that has lost its grip is bistable. Unknown differences of the water decide whether and when it spins down
+    in a puddle, and when it recovers. Its speed can then be tens of m/s away from the simulation: chance, no error of
+    the model. `columns` (n,): wheels that are not logged are taken from the simulation alone, led along the course at
+    the velocity `v` [m/s]; of each of `models`, as it is, and with twice the lost contact.
+
+    A span begins where a wheel loses its grip, measured or in any simulation. It ends when the stretch of water is
+    over and the car has recovered. A wheel that floats a little less also floats a little later.
+    """
+    out: BoolArray = np.zeros(v.shape, dtype=bool)
+    if not course.lanes:
+        return out
+    for shown in (columns, *(follow(vehicle, course, m) for m in models)):
+        if all(f"omega_{w}" in shown for w in WHEELS):
+            speed = shown.get("v_x", v)
+            # over a speed that is not too small: a standing car does not slip
+            slip = (centre_line_speeds(shown, vehicle) - speed) / np.maximum(speed, V_LEAST)
+            out |= np.abs(slip).max(axis=0) > BEYOND_GRIP
+    left_out = out.copy()
+    for lane in course.lanes:
+        first = np.flatnonzero(out & (course.t >= lane.start) & (course.t < lane.end))
+        if first.size:
+            left_out |= (course.t >= course.t[first[0]]) & (course.t < lane.end + RECOVERY_S)
+    return left_out

@@ -12,9 +12,8 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import contrasts
-from aqualog.diagnose.day_to_day import as_value, day_to_day, kind_of
 from aqualog.diagnose.drive import Drive
-from aqualog.diagnose.file_values import deviation
+from aqualog.diagnose.file_values import as_value, day_to_day, deviation, kind_of
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.spectrum import weighing
 from aqualog.model.term import Kind, Model
@@ -67,33 +66,26 @@ def make_evidence(
     """Columns of all hypotheses; `present_values` (hypothesis, parameter): values in the model at hand."""
     columns: list[tuple[int, ...]] = []
     variants = Counter((h.effect.name, h.where) for h in asked if not (h.allowed or h.effect.drive.begins_like))
-    prior, low, high, smallest, tolerance, spread = [], [], [], [], [], []
+    rows: list[tuple[float, ...]] = []
     kinds: list[Kind] = []
-    as_values = []
-    speed = _drag_speed(drives)
-    k = 0
+    speed, car = _drag_speed(drives), drives[0].vehicle
     for i, h in enumerate(asked):
-        columns.append(tuple(range(k, k + len(h.free))))
-        k += len(h.free)
+        columns.append(tuple(range(len(rows), len(rows) + len(h.free))))
         # of one effect, which look much alike and together deviate by as much as one; moments do not
         shared = 1.0 / math.sqrt(max(variants[h.effect.name, h.where], 1))
         for name in h.free:
-            p = h.parameter(name)
-            now = present_values[i, name]
-            prior.append(p.sigma)
-            low.append(p.low - now)
-            high.append(p.high - now)
-            smallest.append(h.worth_naming(name))
-            car = drives[0].vehicle
-            spread.append(shared * math.hypot(day_to_day(h, name, car), deviation(h, name, car)))
+            p, now = h.parameter(name), present_values[i, name]
+            spread = shared * math.hypot(day_to_day(h, name, car), deviation(h, name, car))
+            tolerance = shared * h.tolerance(name)
+            size, value = h.worth_naming(name), as_value(h, name, car, speed)
+            rows.append((p.sigma, p.low - now, p.high - now, size, tolerance, spread, value))
             kinds.append(kind_of(h, name))
-            as_values.append(as_value(h, name, car, speed))
-            tolerance.append(shared * h.tolerance(name))
-    flat = [np.concatenate(list(s)) for s in signatures]
+    flat = tuple(np.concatenate(list(s)) for s in signatures)
+    prior, low, high, smallest, allowed, off, values = np.ascontiguousarray(np.array(rows).T)
+    barred = np.zeros(len(asked), dtype=bool)
     return Evidence(
-        tuple(drives), tuple(asked), tuple(residuals), tuple(flat), tuple(columns), np.array(prior),
-        np.array(low), np.array(high), np.array(smallest), np.array(tolerance), np.zeros(len(asked), dtype=bool),
-        np.array(spread), tuple(kinds), np.array(as_values),
+        tuple(drives), tuple(asked), tuple(residuals), flat, tuple(columns), prior, low, high, smallest, allowed,
+        barred, off, tuple(kinds), values,
     )  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -46,26 +45,15 @@ class Extended(NamedTuple):
 
 
 def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extended:
-    """Signals and vehicle for the detectors, with the terms of a model taken into account.
+    """Signals as loaded with `vehicle`, and vehicle, for the detectors, with the terms of a model taken into account.
 
     Each term acts on the simulation of the dry car of the vehicle file; the changed values are read back. Terms for
     which the vehicle file has a key change the vehicle: mass and its position, drag area, rolling resistance (with
     dragging brakes), inertias, radii, slip slopes. Other terms change the signals. A sensor's error is removed. A wheel
     whose radius differs from its axle's is converted to that radius. A force that slows the car (wind, trailer, cold
     tyres, curves) is added to the accelerometer, which then shows the car without it. Such a force is a slow change of
-    about 0.1 m/s², which the velocity observer learns as an offset anyway.
-
-    Parameters
-    ----------
-    signals : Signals
-        As loaded with `vehicle`.
-    vehicle : Vehicle
-    model : Model
-
-    Returns
-    -------
-    Extended
-        The given objects themselves if the model has no terms or only neutral ones.
+    about 0.1 m/s², which the velocity observer learns as an offset anyway. The given objects themselves if the model
+    has no terms or only neutral ones.
 
     Raises
     ------
@@ -75,13 +63,21 @@ def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extende
     base = _believed(vehicle)
     terms = tuple(t for t in model.terms if not _is_neutral(t))
     setup = Model(terms).apply(base)
-    measured = _Columns(signals)
+    own = {s: signals.array(s) for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height}
+    measured = _Measured(signals.array("t"), signals.dt, dict(own))
     _undo_sensors(measured, setup.sensors)
     notes = [n for t in terms for n in _notes(t, base, measured)]
     car = _vehicle(vehicle, base.plant, setup.plant, notes)
     _undo_wheels(measured, base.plant, setup.plant)
     notes += _undo_forces(measured, base.plant, setup.plant)
-    return Extended(measured.signals(), car, tuple(dict.fromkeys(notes)))
+    new = {s: x for s, x in measured.columns.items() if x is not own[s]}
+    if new:
+        import polars as pl
+
+        signals = replace(
+            signals, frame=signals.frame.with_columns([pl.Series(s, x, nan_to_null=True) for s, x in new.items()])
+        )
+    return Extended(signals, car, tuple(dict.fromkeys(notes)))
 
 
 def _believed(vehicle: Vehicle) -> Setup:
@@ -100,58 +96,29 @@ def _changed(before: Plant, after: Plant) -> set[str]:
     return {n for n in Plant._fields if not np.array_equal(getattr(before, n), getattr(after, n))}
 
 
-class _Columns:
-    """The columns of a drive, copied where they are changed; NaN where missing."""
+class _Measured(NamedTuple):
+    """The columns of a drive that have values, (n,) each, at the times `t` [s]; a changed one takes its place."""
 
-    def __init__(self, signals: Signals) -> None:
-        self._signals = signals
-        self._new: dict[str, FloatArray] = {}
-        self.names = {s for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height}
-
-    def get(self, name: str) -> FloatArray:
-        """One column (n,)."""
-        return self._new[name] if name in self._new else self._signals.array(name)
-
-    def put(self, name: str, x: FloatArray) -> None:
-        """Replace a column, if the drive has it."""
-        if name in self.names:
-            self._new[name] = x
-
-    @property
-    def t(self) -> FloatArray:
-        """[s] (n,)"""
-        return self._signals.array("t")
-
-    @property
-    def dt(self) -> float:
-        """[s]"""
-        return self._signals.dt
-
-    def signals(self) -> Signals:
-        """The drive with its new columns; the given drive without any."""
-        if not self._new:
-            return self._signals
-        import polars as pl
-
-        columns = [pl.Series(n, x, nan_to_null=True) for n, x in self._new.items()]
-        return replace(self._signals, frame=self._signals.frame.with_columns(columns))
+    t: FloatArray
+    dt: float
+    columns: dict[str, FloatArray]
 
 
-def _undo_sensors(measured: _Columns, sensors: Sensors) -> None:
+def _undo_sensors(measured: _Measured, sensors: Sensors) -> None:
     """Remove sensor errors from a signal: gain, bias and drift, then its delay and the drift of its clock.
 
     A late signal is moved by whole samples. Interpolated samples would have less noise than the detectors of wheel
     vibration expect.
     """
-    t = measured.t
+    t, columns = measured.t, measured.columns
     for name, c in sensors.channels.items():
-        if c != Channel():
-            measured.put(name, (measured.get(name) - c.bias - c.drift * t) / c.gain)
+        if c != Channel() and name in columns:
+            columns[name] = (columns[name] - c.bias - c.drift * t) / c.gain
     skew = {name: g.skew_ppm for g in sensors.groups for name in g.signals if g.skew_ppm != 0.0}
     late = {name: c.delay_s for name, c in sensors.channels.items() if c.delay_s != 0.0}
-    for name in {**skew, **late}:
+    for name in {**skew, **late}.keys() & columns.keys():
         seen = (t - t[0] + late.get(name, 0.0)) * (1.0 + skew.get(name, 0.0) * 1e-6) / measured.dt
-        measured.put(name, _taken(measured.get(name), np.rint(seen)))
+        columns[name] = _taken(columns[name], np.rint(seen))
 
 
 def _taken(x: FloatArray, i: FloatArray) -> FloatArray:
@@ -159,7 +126,7 @@ def _taken(x: FloatArray, i: FloatArray) -> FloatArray:
     return np.where(inside, x[np.where(inside, i, 0.0).astype(np.intp)], np.nan)
 
 
-def _notes(term: Term, base: Setup, measured: _Columns) -> list[str]:
+def _notes(term: Term, base: Setup, measured: _Measured) -> list[str]:
     """Reason why a term has no effect, or only part of its effect, on the detectors."""
     name = f"model: {term.effect.name}" + (f" at {term.place}" if term.place else "")
     after = term.apply(base)
@@ -169,7 +136,7 @@ def _notes(term: Term, base: Setup, measured: _Columns) -> list[str]:
         n for b, a in zip(base.sensors.groups, after.sensors.groups, strict=True) if a != b for n in a.signals
     }  # fmt: skip
     if acts_on:
-        return [] if acts_on & measured.names else [f"{name}: the log has no {term.place}; not used"]
+        return [] if acts_on & measured.columns.keys() else [f"{name}: the log has no {term.place}; not used"]
     unused = changed - _VEHICLE - _SIGNAL - _SILENT
     if not changed & (_VEHICLE | _SIGNAL):
         return [f"{name}: no detector uses this quantity; not used"]
@@ -213,37 +180,38 @@ def _rolling_resistance(plant: Plant) -> float:
     return float((plant.r_w * loads + plant.brake_drag / plant.r_e).sum() / loads.sum())
 
 
-def _undo_wheels(measured: _Columns, before: Plant, after: Plant) -> None:
+def _undo_wheels(measured: _Measured, before: Plant, after: Plant) -> None:
     """Wheel speeds and torques of a car whose wheels have the radius of their axle and report all of their torque."""
     changed = _changed(before, after)
     grows = changed & {"radius_growth", "leak_radius"}
     v = _speed(measured, after) if grows else np.zeros(0)
     # as the compiled simulation lets a tyre lose its air
     leak = np.clip((measured.t - after.leak_start) / after.leak_time, 0.0, 1.0)
+    columns = measured.columns
     for i, w in enumerate(WHEELS):
-        other = WHEELS.index(next(x for x in AXLES[w[0]] if x != w))
-        factor = _over_axle(after.r_e, i, other)
-        if factor != 1.0:
-            measured.put(f"omega_{w}", factor * measured.get(f"omega_{w}"))
-        if grows and (after.radius_growth[i] != 0.0 or after.leak_radius[i] != 0.0):
+        omega, torque = f"omega_{w}", f"torque_{w}"
+        factor = _over_axle(after.r_e, i, WHEELS.index(next(x for x in AXLES[w[0]] if x != w)))
+        if factor != 1.0 and omega in columns:
+            columns[omega] = factor * columns[omega]
+        if grows and omega in columns and (after.radius_growth[i] != 0.0 or after.leak_radius[i] != 0.0):
             ratio = effective_radius(np.ones(1), v, growth=float(after.radius_growth[i]))
-            ratio = ratio * (1.0 - after.leak_radius[i] * leak)
-            measured.put(f"omega_{w}", ratio * measured.get(f"omega_{w}"))
+            columns[omega] = ratio * (1.0 - after.leak_radius[i] * leak) * columns[omega]
         gain = after.torque_gain / factor
-        if gain != 1.0:
-            measured.put(f"torque_{w}", gain * measured.get(f"torque_{w}"))
+        if gain != 1.0 and torque in columns:
+            columns[torque] = gain * columns[torque]
 
 
 def _over_axle(radius: FloatArray, i: int, other: int) -> float:
     return 1.0 if radius[i] == radius[other] else float(radius[i] / (0.5 * (radius[i] + radius[other])))
 
 
-def _undo_forces(measured: _Columns, before: Plant, after: Plant) -> list[str]:
+def _undo_forces(measured: _Measured, before: Plant, after: Plant) -> list[str]:
     """Add forces that have no key in the vehicle file to the accelerometer, which then shows the car without them."""
     forces = _changed(before, after) & _FORCES
-    if not forces or "a_x" not in measured.names:
+    columns = measured.columns
+    if not forces or "a_x" not in columns:
         return [f"model: the log has no a_x; {', '.join(sorted(forces))} not used"] if forces else []
-    v, a_x, notes = np.nan_to_num(_speed(measured, after)), measured.get("a_x"), []
+    v, a_x, notes = np.nan_to_num(_speed(measured, after)), columns["a_x"], []
     lost = np.zeros_like(v)
     air = {"drag_area": after.drag_area, "air_density": after.air_density}
     if "head_wind" in forces:
@@ -256,24 +224,23 @@ def _undo_forces(measured: _Columns, before: Plant, after: Plant) -> list[str]:
     if "towed_mass" in forces:
         lost += after.towed_mass * (np.nan_to_num(a_x) + G * after.r_w[2])
     if "cornering_drag" in forces:
-        if "a_y" in measured.names:
-            a_y = np.nan_to_num(measured.get("a_y"))
+        if "a_y" in columns:
+            a_y = np.nan_to_num(columns["a_y"])
             lost += cornering_drag(a_y, mass=after.mass, coefficient=after.cornering_drag)
         else:
             notes.append("model: the log has no a_y; cornering_drag not used")
-    measured.put("a_x", a_x + lost / after.mass)
+    columns["a_x"] = a_x + lost / after.mass
     return notes
 
 
-def _speed(measured: _Columns, plant: Plant) -> FloatArray:
+def _speed(measured: _Measured, plant: Plant) -> FloatArray:
     """Speed of the car (n,): the reference, or else the mean of the rims that are known. [m/s]"""
-    rims: Mapping[int, FloatArray] = {
-        i: plant.r_e[i] * measured.get(f"omega_{w}") for i, w in enumerate(WHEELS) if f"omega_{w}" in measured.names
-    }
-    v = measured.get("v_x")
+    columns = measured.columns
+    rims = [plant.r_e[i] * columns[f"omega_{w}"] for i, w in enumerate(WHEELS) if f"omega_{w}" in columns]
+    v = columns.get("v_x", np.full(measured.t.shape, np.nan))
     if not rims:
         return v
-    known = np.array(list(rims.values()))
+    known = np.array(rims)
     count = np.isfinite(known).sum(axis=0)
     mean = np.where(count > 0, np.nansum(known, axis=0) / np.maximum(count, 1), np.nan)
     return np.where(np.isfinite(v), v, mean)

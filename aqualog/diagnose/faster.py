@@ -15,10 +15,10 @@ from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.full_rate import LEVEL, Kind, PerTurn, Z, per_turn, wheel_columns
 from aqualog.diagnose.isolate import POWER
-from aqualog.diagnose.outcome import Outcome
 from aqualog.diagnose.records import SURE, Cause, Estimate, Limit, Verdict
 from aqualog.diagnose.seams import seams
-from aqualog.diagnose.search import DOUBT
+from aqualog.diagnose.search import DOUBT, Option
+from aqualog.diagnose.verdict import Outcome
 from aqualog.diagnose.words import cause_sentence, place
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
@@ -70,7 +70,7 @@ def faster(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, model: Model
     return Faster(named, tuple(notes), {_RING.name: reason} if reason else {}, sharp)
 
 
-def joined(outcome: Outcome, seen: Faster) -> Outcome:
+def joined(outcome: Outcome[Option], seen: Faster) -> Outcome[Option]:
     """The outcome with the causes beside its own: they act on no residual of the search, so neither hides the other."""
     if not seen.causes:
         return outcome

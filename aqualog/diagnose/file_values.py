@@ -1,4 +1,4 @@
-"""How far the values of a vehicle file may be off themselves, expressed in the parameters of effects.
+"""How far a vehicle file's values may be off, and differ from drive to drive, in the parameters of effects.
 
 The key stands in the effect's row: `DayToDay.key` of the whole car, `DriveSearch.axle_key` of an axle.
 """
@@ -11,10 +11,14 @@ from aqualog.core.notation import AXLES
 from aqualog.core.provenance import provenance_of, uncertainty
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.diagnose.words import listed
 from aqualog.model.effects import EFFECTS
-from aqualog.model.term import Model, Term
+from aqualog.model.term import Kind, Model, Term
 
-__all__ = ["calibrated_enough", "deviation", "key_of", "not_calibrated", "own_sd", "with_known"]
+__all__ = [
+    "as_value", "calibrated_enough", "day_to_day", "deviation", "key_of", "kind_of", "not_calibrated", "own_sd",
+    "with_known",
+]  # fmt: skip
 
 _MATTERS = ("mass", "torque_gain", "wheels.r_e_f", "wheels.r_e_r")
 
@@ -86,11 +90,57 @@ def not_calibrated(vehicle: Vehicle) -> str:
     keys = calibrated_enough(vehicle)
     if not keys:
         return ""
-    listed = " and ".join(filter(None, (", ".join(keys[:-1]), keys[-1])))
     known = (
         "" if provenance_of(vehicle, "mass").source == "measured" else ", best with the weighed mass (--fix mass=...)"
     )
-    doubt = f"{listed} {'is a guess' if len(keys) == 1 else 'are guesses'}"
+    doubt = f"{listed(keys)} {'is a guess' if len(keys) == 1 else 'are guesses'}"
     if not vehicle.provenance:
         doubt = "it does not say where its values come from, so they count as exact"
     return f"This vehicle file was not calibrated: {doubt}; run `aqualog calibrate` on four or more dry drives{known}."
+
+
+def day_to_day(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
+    """Standard deviation of a parameter from drive to drive, in the effect's unit; 0 where the file gives no value.
+
+    Applies to the whole car only: wind, surface, temperature and the torque's estimate do not act on a single axle.
+    Each key of the file counts here once.
+    """
+    row = h.parameter(name).day_to_day
+    if row is None or h.where is not None:
+        return 0.0
+    sd = vehicle.spread.get(row.key, 0.0)
+    # the effect's gain is on top of the file's
+    return sd / vehicle.torque_gain if row.key == "torque_gain" else sd
+
+
+def kind_of(h: Hypothesis, name: str) -> Kind:
+    """The kind of day-to-day difference that a parameter looks like, or an empty string.
+
+    The force balance cannot separate mass from the torque's gain, drag area from the day's wind, or rolling resistance
+    from drag.
+    """
+    row = h.parameter(name).day_to_day
+    return "" if row is None else row.kind
+
+
+def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:
+    """Day-to-day differences of its kind and errors of the file, as a standard deviation of one of its parameters.
+
+    In the parameter's unit; `speed`: at which its drag counts [m/s].
+    """
+    row = h.parameter(name).day_to_day
+    own = deviation(h, name, vehicle)
+    if row is None:
+        return own
+
+    def off(key: str) -> float:
+        return math.hypot(vehicle.spread.get(key, 0.0), own_sd(vehicle, key))
+
+    sd = {
+        "inertia": math.hypot(off("mass") / vehicle.mass, off("torque_gain") / vehicle.torque_gain),
+        "drag": off("drag_area"),
+        "rolling": off("rolling_resistance"),
+    }[row.kind]
+    alike = row.value(sd, vehicle, h.where, speed)
+    is_in = h.where is None and row.key  # the file's own value is one of those above
+    return max(alike, own) if is_in else math.hypot(alike, own)

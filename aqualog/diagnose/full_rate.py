@@ -116,21 +116,10 @@ def wheel_columns(signals: Signals) -> dict[str, FloatArray]:
 def per_turn(
     columns: Mapping[str, FloatArray], dt: float, origins: Mapping[str, Origin]
 ) -> tuple[PerTurn, ...]:  # fmt: skip
-    """What repeats with every turn of each wheel, and with every half and third of a turn.
+    """What repeats with every turn, half and third of a turn of each wheel: one for each wheel and order.
 
-    Parameters
-    ----------
-    columns : mapping of array (n,)
-        `omega_*` [rad/s], not averaged; NaN where a sample is missing.
-    dt : float
-        [s]
-    origins : mapping of Origin
-        Rate of each signal on its bus, and its unit.
-
-    Returns
-    -------
-    found : tuple of PerTurn
-        One for each wheel in the log and each order.
+    `columns`: `omega_*` (n,) [rad/s] at the step `dt` [s], not averaged, NaN where a sample is missing; `origins`: rate
+    of each signal on its bus, and its unit.
 
     The angle is the integral of the wheel speed itself, so delays do not matter. Its noise makes the angle drift: sums
     over the whole drive and over 512, 64 and 16 turns compete. A control unit averages over nothing up to the period of

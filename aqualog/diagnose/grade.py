@@ -48,19 +48,15 @@ BIAS_SD, FORCE_SD = 0.1, 0.03  # [m/s^2] mean slope hidden by offsets of acceler
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """A hilly road. Arrays over the knots `s` (k,) [m]: slope angle `theta` [rad], uphill positive, with its pointwise
-    95 % band; its mean over the drive is left out, because a constant could also be the accelerometer's offset.
+    """A hilly road: slope angle `theta` [rad] over the knots `s` [m], (k,) each, uphill positive; its mean over the
+    drive is left out, because a constant could also be the accelerometer's offset.
 
     `rms` and `mean` [rad] with 95 % intervals; `shared`: correlation of the two channels over 150 m, NaN without
-    torque; `lap_m`: length after which the road repeats itself, None on one pass; `known`: knots with data near by.
+    torque; `lap_m`: length after which the road repeats itself, None on one pass.
     """
 
-    drive: str
     s: FloatArray
     theta: FloatArray
-    low: FloatArray
-    high: FloatArray
-    known: BoolArray
     rms: Estimate
     mean: Estimate
     p_value: float
@@ -118,18 +114,9 @@ def with_profile(model: Model, profile: Profile) -> Model:
 def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
     """The slope of the road along a drive, or None if the drive does not show one.
 
-    Parameters
-    ----------
-    drive : Drive
-    residual : array (C, n)
-        Of the drive's channels under the model at hand [m/s²].
-
-    Returns
-    -------
-    profile : Profile or None
-        With torque: the part that both channels share, beyond chance and beyond 0.5 % rms. Without torque: only if a
-        second pass shows the same profile, or beyond 2 % rms. Errors of mass, delays, scales and clocks follow the
-        acceleration and are removed from both channels first.
+    `residual` (C, n): of the drive's channels under the model at hand [m/s²]. With torque: the part that both channels
+    share, beyond chance and beyond 0.5 % rms. Without torque: only if a second pass shows the same profile, or beyond 2
+    % rms. Errors of mass, delays, scales and clocks follow the acceleration and are removed from both channels first.
     """
     if "kinematic" not in drive.channels:
         return None
@@ -153,10 +140,8 @@ def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
         power = float(np.mean(F[at] ** 2))
         share = min(max(float(np.mean((K * F)[at])) / max(power, 1e-12), 0.0), 1.0)
         z, p = bins.kinematic - share * bins.force, math.erfc(score / math.sqrt(2.0))
-    s, theta, half, known = _estimate(bins, z)
-    return Profile(
-        drive.name, s, theta, theta - half, theta + half, known, _rms(theta, half, bins), _mean(bins), p, shared, lap
-    )
+    s, theta, half = _estimate(bins, z)
+    return Profile(s, theta, _rms(theta, half, bins), _mean(bins), p, shared, lap)
 
 
 def _rms(theta: FloatArray, half: FloatArray, bins: _Bins) -> Estimate:
@@ -277,8 +262,8 @@ def _lap(bins: _Bins, K: FloatArray) -> float | None:
     return found
 
 
-def _estimate(bins: _Bins, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Penalised slope over position, fitted with the motion's shapes: knots [m], theta, half band [rad], known."""
+def _estimate(bins: _Bins, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Penalised slope over position, fitted with the motion's shapes: knots [m], theta, half of its band [rad]."""
     # speed and time would pass for slow waves of the road
     motion = bins.motion[:, GOES_WITH_ACCELERATION]
     k, q = z.size, motion.shape[1]
@@ -299,9 +284,8 @@ def _estimate(bins: _Bins, z: FloatArray) -> tuple[FloatArray, FloatArray, Float
     variance = np.diag(inverse @ (A.T @ A) @ inverse)[:k] * float(np.mean(left[bins.used] ** 2)) * coloured
     theta: FloatArray = x[:k] / G
     theta = theta - float(np.average(theta, weights=bins.weight))
-    near = np.convolve(bins.used.astype(np.float64), np.ones(2 * round(OVER_M / BIN_M) + 1), "same")[:k] > 0.5
     s: FloatArray = (np.arange(k, dtype=np.float64) + 0.5) * BIN_M
-    return s, theta, (1.96 * np.sqrt(np.maximum(variance, 0.0)) + np.abs(bias)) / G, np.asarray(near)
+    return s, theta, (1.96 * np.sqrt(np.maximum(variance, 0.0)) + np.abs(bias)) / G
 
 
 def _correlated(x: FloatArray, at: BoolArray) -> float:

@@ -1,4 +1,4 @@
-"""Inputs of the simulation without their sensors' noise.
+"""Inputs of the simulation without their sensors' noise, and replacements for those that a log lacks.
 
 The inputs of the simulation are not compared with a measurement, but their noise would enter on both sides: in the
 residual and in the signature of an effect. A regression would then find effects in noise.
@@ -6,12 +6,24 @@ residual and in the signature of an effect. A regression would then find effects
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.core.records import FloatArray
+from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.vehicle import Vehicle
+from aqualog.model.plant import understeer_gradient
+from aqualog.model.tyre import Tyre
+from aqualog.physics.kinematics import kinematic_steer_angle
+from aqualog.physics.load import G
 
-__all__ = ["SPEED_S", "confirmed_torque", "quiet", "quiet_speed", "quiet_torque", "smooth"]
+__all__ = [
+    "A_MOST", "BRAKE_PRESSURE", "LEAST_S", "SPEED_S", "V_MIN", "brakes_in_torque", "brakes_unlogged",
+    "confirmed_torque", "needed_torque", "quiet", "quiet_speed", "quiet_torque", "road_wheel_angle", "roll_out",
+    "smooth",
+]  # fmt: skip
 
 SPEED_BAND_HZ = (2.0, 4.5)  # there a speed is noise: 0.1 m/s^2 are below 8 mm/s; beyond, slow buses are interpolated
 TORQUE_BAND = (0.1, 0.2)  # of the rate at which a torque is sampled: there it is noise, pedals and tyres are slower
@@ -32,6 +44,14 @@ SURELY = 2.0  # standard deviations by which a share may be overestimated
 WITHIN = (0.5, 1.5)  # of the expected acceleration per torque, which the car must show for the comparison
 LOCAL = 9  # frequencies over which a spectrum is smoothed
 OVER = 3.0  # multiple of the noise that a frequency needs to pass: one of a thousand passes by chance (D)
+STEER_S = 0.5  # [s]
+V_MIN = 4.0  # [m/s] below it, creeping, clutch and standstill dominate
+A_MOST = 3.0  # [m/s^2] of replaced torque beyond resistance: with more, the simulated car spins in a curve
+UNEXPLAINED = 0.8  # [m/s^2] more than a grade of 8 %
+OFTEN = 0.01  # share of the driving
+LEAST_S = 20.0  # [s] of usable driving
+BRAKE_PRESSURE = 0.5e5  # [Pa]
+HOLDS_BRAKES = -300.0  # [N·m] of all wheels, where the brakes are pressed hard
 
 
 def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
@@ -44,19 +64,11 @@ def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
 
 
 def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
-    """A signal after Wiener's filter [wiener1949]: each frequency weighted by its share above the white noise.
+    """A signal (n,) after Wiener's filter [wiener1949]: each frequency weighted by its share above the white noise.
 
     The noise is estimated in a band well above the frequencies of drivers' actions. A signal sampled too slowly for
-    that stays unchanged. Zero phase: no delay.
-
-    Parameters
-    ----------
-    x : array (n,)
-    dt : float
-        Step of the grid. [s]
-    rate_hz : float, optional
-        Rate of the signal on the bus if it is slower than the grid. Linear interpolation between its samples has less
-        noise at high frequencies. [Hz]
+    that stays unchanged. Zero phase: no delay. `dt`: step of the grid [s]; `rate_hz`: of the signal on the bus, if it
+    is slower than the grid, since linear interpolation between its samples has less noise at high frequencies.
     """
     rate = min(rate_hz or 1.0 / dt, 1.0 / dt)
     low, high = (max(share * rate, least) for share, least in zip(TORQUE_BAND, LEAST_BAND_HZ, strict=True))
@@ -129,27 +141,15 @@ def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) ->
 
 
 def confirmed_torque(torque: FloatArray, a: FloatArray, dt: float, per_torque: float) -> FloatArray:
-    """Wheel torques with each frequency weighted by the share that the car's acceleration confirms.
+    """Wheel torques (4, n) [N·m] with each frequency weighted by the share that the car's acceleration confirms.
 
     The noise of a real torque has a colour: within the frequencies of drivers, the torque alone does not show it. But
     it does not accelerate the car. The cross spectrum of torque and acceleration, over the power of the torque, is the
     share of torque in it, which is the weight of Wiener's filter [wiener1949].
 
-    Parameters
-    ----------
-    torque : array (4, n)
-        [N·m]
-    a : array (n,)
-        Measured acceleration, finite; its own noise does not matter. [m/s²]
-    dt : float
-        [s]
-    per_torque : float
-        Acceleration per torque of the car of the file, which is compared at low frequencies only. [m/s²/(N·m)]
-
-    Returns
-    -------
-    torque : array (4, n)
-        Unchanged if the drive is too short or steady to show it.
+    `a` (n,): measured acceleration, finite, whose own noise does not matter [m/s²]; `per_torque`: acceleration per
+    torque of the car of the file, compared at low frequencies only [m/s²/(N·m)]. Unchanged if the drive is too short or
+    steady to show it.
     """
     n, size = a.size, round(SEGMENT_S / dt)
     if n < 4 * size:
@@ -192,3 +192,59 @@ def _events(x: FloatArray, dt: float) -> FloatArray:
     out = off > max(STANDS_OUT * 1.4826 * float(np.median(off)), LEAST_EVENT)
     out = np.convolve(out, np.ones(2 * round(BESIDE_EVENT_S / dt) + 1), "same") > 0.5
     return np.where(out, x, x[~out].mean() if not out.all() else 0.0)
+
+
+def roll_out(v: FloatArray, vehicle: Vehicle) -> FloatArray:
+    """How fast the car of the file slows down on a flat dry road without torque. (n,) [m/s] to [m/s²], positive"""
+    drag = 0.5 * vehicle.air_density * vehicle.drag_area * v * v / vehicle.mass
+    return drag + G * vehicle.rolling_resistance
+
+
+def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
+    """Torque at the driven wheels that the car of the file needs for a speed on a flat road. (4, n) [N·m], >= 0
+
+    Zero where the car slows down faster than it rolls out: brakes are on all wheels, and one axle alone would lock at
+    that deceleration. At most for `A_MOST`.
+    """
+    inertia = np.gradient(smooth(v, dt, SPEED_S), dt)
+    force = vehicle.mass * np.maximum(np.minimum(inertia, A_MOST) + roll_out(v, vehicle), 0.0)
+    rear = {"rwd": 1.0, "fwd": 0.0}.get(vehicle.drivetrain, vehicle.torque_split_rear)
+    return np.array([0.5 * (rear if w[0] == "r" else 1.0 - rear) * force * vehicle.arm(w) for w in WHEELS])
+
+
+def road_wheel_angle(
+    columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, dt: float, *, most: float
+) -> FloatArray:
+    """Angle of the front wheels, measured or computed from the gyro with the model. (n,) [rad], left positive
+
+    `most` [m/s²]: lateral acceleration beyond which the angle is cut; larger than in the samples used, because the
+    simulated car could spin.
+    """
+    understeer = understeer_gradient(Tyre().cornering_slope)
+    if "steer_angle" in columns:
+        angle = columns["steer_angle"]
+    elif "yaw_rate" in columns:
+        rolling = kinematic_steer_angle(columns["yaw_rate"], v, wheelbase=vehicle.wheelbase)
+        angle = rolling + understeer * v * columns["yaw_rate"]
+    else:
+        return np.zeros_like(v)
+    limit = most * (vehicle.wheelbase / np.maximum(v, V_MIN) ** 2 + understeer)
+    return smooth(np.clip(angle, -limit, limit), dt, STEER_S)
+
+
+def brakes_in_torque(pressure: FloatArray, torque: FloatArray) -> bool:
+    """Whether the torque (4, n) holds the brakes: it is far below zero where the brakes are pressed."""
+    braked = pressure > 4.0 * BRAKE_PRESSURE
+    if braked.sum() < 10:
+        return True
+    return bool(np.median(torque.sum(axis=0)[braked]) < HOLDS_BRAKES)
+
+
+def brakes_unlogged(torque: FloatArray, v: FloatArray, wet: BoolArray, vehicle: Vehicle, dt: float) -> bool:
+    """Whether the car often slows down much more than torque and resistance explain off the water, so by braking."""
+    a = smooth(np.gradient(smooth(v, dt, SPEED_S), dt), dt, SPEED_S)
+    explained = smooth(torque.sum(axis=0), dt, SPEED_S) / (vehicle.arm("fl") * vehicle.mass) - roll_out(v, vehicle)
+    moving = (v > V_MIN) & ~wet
+    if moving.sum() * dt < LEAST_S:
+        return False
+    return bool(((a < explained - UNEXPLAINED) & moving).sum() > OFTEN * moving.sum())

@@ -15,24 +15,12 @@ from aqualog.diagnose.records import Confusion, Limit
 from aqualog.diagnose.subsets import compatible
 from aqualog.diagnose.words import listed, name_of, quantity
 
-__all__ = ["POWER", "confusions", "limits", "reference_sizes", "separation"]
+__all__ = ["POWER", "confusions", "limits", "p_correct", "reference_sizes"]
 
 POWER = 0.9
 TOLD_APART = 0.95  # probability of naming the right one of two, from which they count as distinguished
 EXACT = 1e-3  # largest share of an effect's energy that an exact relation may leave
 RIVALS = 10  # most similar rivals, from which sets are formed
-
-
-def separation(gram: FloatArray, columns: Sequence[int], rivals: Sequence[int], theta: FloatArray) -> float:
-    """Whitened energy of columns at values `theta` that the columns `rivals` cannot imitate (lambda)."""
-    c, r = list(columns), list(rivals)
-    rest = gram[np.ix_(c, c)]
-    if r:
-        rest = (
-            rest
-            - gram[np.ix_(c, r)] @ np.linalg.pinv(gram[np.ix_(r, r)], hermitian=True, rcond=1e-9) @ gram[np.ix_(r, c)]
-        )
-    return max(float(theta @ rest @ theta), 0.0)
 
 
 def p_correct(lam: float) -> float:

@@ -13,9 +13,8 @@ from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.manoeuvres import SENSORS, Run, Sensor, checks, fitting
 from aqualog.diagnose.noise import Noise
-from aqualog.diagnose.outcome import Rival
 from aqualog.diagnose.records import SURE, Manoeuvre
-from aqualog.diagnose.run_information import Case, Forecast, entropy, forecast, of_check, of_log, of_run
+from aqualog.diagnose.run_information import Case, Forecast, Rival, entropy, forecast, of_check, of_log, of_run
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.words import name_of
 from aqualog.model.term import Check, Model
@@ -53,26 +52,12 @@ class _Option:
 def next_manoeuvre(
     evidence: Evidence, rivals: Sequence[Rival], noises: Sequence[Noise], model: Model
 ) -> Manoeuvre | None:
-    """The run, check or sensor that distinguishes sets that the log cannot distinguish.
+    """The run, check or sensor that distinguishes sets that the log cannot; None if no two differ in their effects.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        Drives with the signatures of all hypotheses.
-    rivals : sequence of Rival
-        Refitted sets with their probabilities, best first.
-    noises : sequence of Noise
-        Of each drive, after the best set.
-    model : Model
-        On which the sets come.
-
-    Returns
-    -------
-    manoeuvre : Manoeuvre or None
-        None if no two sets differ in their effects. `name` is that of the run or check with the most information per
-        minute of those that reach a probability of 0.95, else with the most information; `sensor` if only a further
-        signal would give a tenth of the missing information; `none` if nothing does. `separates` has the pairs that
-        it decides in 95 of 100 cases. The same for the same input.
+    `rivals`: refitted sets on `model`, best first; `noises`: of each drive, after the best set. The `name` is that of
+    the run or check with the most information per minute of those that reach a probability of 0.95, else with the most
+    information. It is `sensor` if only a further signal would give a tenth of the missing information, and `none` if
+    nothing does. `separates` has the pairs that it decides in 95 of 100 cases. The same for the same input.
     """
     names = [frozenset(h.effect.name for h in c.refit.members) for c in rivals]
     if len(set(names)) < 2:

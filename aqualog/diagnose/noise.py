@@ -78,22 +78,11 @@ def good_size(n: int) -> int:
 
 
 def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> Noise:
-    """Noise of a residual (C, n) on its usable samples.
+    """Noise of a residual (C, n), known effects subtracted, on its usable samples `mask` (n,): some hundreds at least.
 
-    Parameters
-    ----------
-    residual : array (C, n)
-        After known effects have been subtracted.
-    mask : array (n,)
-        Usable samples; at least some hundreds.
-    contrasts : array (C, C)
-        Combinations of channels that share little noise, as rows.
-
-    Returns
-    -------
-    Noise
-        Its order is chosen per contrast by Akaike's criterion [akaike1974]; innovations beyond 3 standard deviations
-        weigh less (Huber [huber1981]), so that outliers and kerbs do not dominate.
+    `contrasts` (C, C): combinations of channels that share little noise, as rows. The order is chosen per contrast by
+    Akaike's criterion [akaike1974]. Innovations beyond 3 standard deviations weigh less (Huber [huber1981]), so that
+    outliers and kerbs do not dominate.
     """
     x = bridged(residual, mask)
     used = _settled(mask)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,45 +13,25 @@ from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.compete import Members, Posterior, fitted
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
-from aqualog.diagnose.judge import repeats
-from aqualog.diagnose.records import SURE, Alternative, Cause, Estimate, Verdict, tempered
+from aqualog.diagnose.noise import Noise, bridged, whitened
+from aqualog.diagnose.records import SURE, Cause, Estimate, tempered
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import DOUBT, Found, Option, sharpened
 from aqualog.diagnose.threads import beside
-from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, candidates, decided, whole
+from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, Outcome, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence, name_of
 from aqualog.model.term import Model
 
-__all__ = ["Outcome", "conclude", "with_causes"]
+__all__ = ["conclude", "repeats", "with_causes"]
 
 Z = 1.959964  # 97.5 % quantile of the normal distribution
 EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect explains it
+THIRDS = 3
+SEEN = 2.0  # standard deviations at which a third of the drive says something of a value
+_ORDINAL = ("the first", "the second", "the last")
 
 
-class Outcome(NamedTuple):
-    """Verdict, causes, alternatives; `chosen` is the refit that the extended model is made of, None without causes.
-
-    `certain`: effects that are there beyond doubt. `small`: sentences about deviations that are significant and too
-    small to be worth naming.
-    """
-
-    verdict: Verdict
-    causes: tuple[Cause, ...]
-    alternatives: tuple[Alternative, ...] = ()
-    chosen: Refit | None = None
-    small: tuple[str, ...] = ()
-    certain: frozenset[str] = frozenset()
-    rivals: tuple[Rival, ...] = ()
-
-
-class Rival(NamedTuple):
-    """A refitted set that remains, and its probability."""
-
-    refit: Refit
-    probability: float
-
-
-def conclude(found: Found, model: Model) -> Outcome:
+def conclude(found: Found, model: Model) -> Outcome[Option]:
     """The verdict on what a search found.
 
     An unknown form comes before any name; beside it stand the effects of the same set whose probability is 0.95 or
@@ -82,12 +61,8 @@ def conclude(found: Found, model: Model) -> Outcome:
     sets = candidates([(o, o.evidence) for o in found.options], causes_of)
     d = decided(sets, lambda group: _at_place(found, group, model), failing)
     if d.verdict == "cannot_tell" and not d.alternatives and d.best and not _is_gain(found, d.best.option.refit, model):
-        return Outcome("no_effect", (), small=d.notes)
-    notes = d.notes + (_beyond(found.arena, d.best.option) if d.best else ())
-    return Outcome(
-        d.verdict, d.causes, d.alternatives, d.best.option.refit if d.best else None, notes, d.certain,
-        tuple(Rival(s.option.refit, q) for s, q in d.rivals if s.option.refit is not None),
-    )  # fmt: skip
+        return Outcome("no_effect", notes=d.notes)
+    return d._replace(notes=d.notes + _beyond(found.arena, d.best.option)) if d.best else d
 
 
 def _beyond(arena: Arena, option: Option) -> tuple[str, ...]:
@@ -211,3 +186,56 @@ def with_causes(model: Model, causes: Sequence[Cause], asked: Sequence[Hypothesi
                 found.append((h, {n: values[n] for n in h.free}))
                 break
     return with_values(model, found)
+
+
+def repeats(
+    refit: Refit, arena: Arena, noises: Sequence[Noise], model: Model, names: Container[str]
+) -> tuple[str, ...]:  # fmt: skip
+    """What speaks against naming some members of a refitted set, by their keys; empty if nothing does.
+
+    Each third of the drives that says something of a value must give it the same sign, and must be predicted better
+    with the values of the other two thirds than without the set. No value may stand at its physical bound.
+    """
+    off = np.array(
+        [v - value_in(model, refit.members[i], n) for (i, n), v in zip(refit.names, refit.values, strict=True)]
+    )
+    G, b = _by_third(refit, arena, noises, off)
+    prior = np.diag(np.array([refit.members[i].parameter(n).sigma for i, n in refit.names]) ** -2.0)
+    out = []
+    total = 0.0
+    for t in range(THIRDS):
+        own = np.linalg.inv(G[t] + prior)
+        alone, sd = own @ b[t], np.sqrt(np.diag(own))
+        for k, (i, _) in enumerate(refit.names):
+            is_named = refit.members[i].key in names
+            if is_named and abs(off[k]) > SEEN * sd[k] and alone[k] * off[k] < 0.0 and abs(alone[k]) > SEEN * sd[k]:
+                h = refit.members[i]
+                out.append(f"{name_of(h.effect.name, h.where)} has the other sign in {_ORDINAL[t]} third of the drive.")
+        rest = [o for o in range(THIRDS) if o != t]
+        others = np.linalg.solve(sum(G[o] for o in rest) + prior, sum(b[o] for o in rest))
+        total += float(2.0 * b[t] @ others - others @ G[t] @ others)
+    if total <= 0.0:
+        every = ", ".join(name_of(h.effect.name, h.where) for h in refit.members)
+        out.append(f"{every}: two thirds of the drive do not predict the other third better with it.")
+    if any(at and refit.members[i].key in names for (i, _), at in zip(refit.names, refit.bounded, strict=True)):
+        out.append("a value stands at its physical bound.")
+    return tuple(out)
+
+
+def _by_third(
+    refit: Refit, arena: Arena, noises: Sequence[Noise], off: FloatArray
+) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Inner products of the set's signatures, and theirs with the residual before it, by thirds of the used time."""
+    k = len(off)
+    G, b = [np.zeros((k, k)) for _ in range(THIRDS)], [np.zeros(k) for _ in range(THIRDS)]
+    for part, noise in zip(arena.parts, noises, strict=True):
+        own, after = refit.signatures[part.drive][..., part.at], refit.residuals[part.drive][:, part.at]
+        before = after + np.tensordot(off, own, axes=1)
+        rows = whitened(bridged(np.concatenate([own, before[None]]), part.mask), noise)
+        rows = rows.reshape(k + 1, *after.shape)
+        third = np.minimum(THIRDS * np.cumsum(part.mask) // max(int(part.mask.sum()), 1), THIRDS - 1)
+        for t in range(THIRDS):
+            x = rows[..., third == t].reshape(k + 1, -1)
+            G[t] += x[:k] @ x[:k].T
+            b[t] += x[:k] @ x[k]
+    return G, b

@@ -10,24 +10,8 @@ from aqualog.core.records import FloatArray
 from aqualog.model.term import Model
 
 __all__ = [
-    "AGREES",
-    "SURE",
-    "Agreement",
-    "Alternative",
-    "ByDrive",
-    "Cause",
-    "ChannelGain",
-    "Confusion",
-    "Consequence",
-    "Diagnosis",
-    "Estimate",
-    "Gain",
-    "Limit",
-    "Manoeuvre",
-    "Remainder",
-    "ResidualView",
-    "Significance",
-    "Verdict",
+    "AGREES", "SURE", "Agreement", "Alternative", "ByDrive", "Cause", "ChannelGain", "Confusion", "Consequence",
+    "Diagnosis", "Estimate", "Gain", "Limit", "Manoeuvre", "Remainder", "ResidualView", "Significance", "Verdict",
     "tempered",
 ]  # fmt: skip
 
@@ -269,17 +253,17 @@ class Diagnosis:
     drives: tuple[str, ...]
     duration_s: float
     used_s: float
-    causes: tuple[Cause, ...]
-    alternatives: tuple[Alternative, ...]
-    significance: Significance | None
-    limits: tuple[Limit, ...]
-    confusions: tuple[Confusion, ...]
-    remainders: tuple[Remainder, ...]
-    manoeuvre: Manoeuvre | None
-    gain: Gain | None
     model: Model
     channels: tuple[str, ...]
-    untested: Mapping[str, str]
+    causes: tuple[Cause, ...] = ()
+    alternatives: tuple[Alternative, ...] = ()
+    significance: Significance | None = None
+    limits: tuple[Limit, ...] = ()
+    confusions: tuple[Confusion, ...] = ()
+    remainders: tuple[Remainder, ...] = ()
+    manoeuvre: Manoeuvre | None = None
+    gain: Gain | None = None
+    untested: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     views: tuple[ResidualView, ...] = field(default=(), repr=False)
     agreement: tuple[Agreement, ...] = ()

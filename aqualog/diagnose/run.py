@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from aqualog.checks.follows import Follow
+from aqualog.checks.follows import Follow, follow
 from aqualog.core.errors import SignalError
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
@@ -20,7 +20,6 @@ from aqualog.diagnose.arena import KNOWN_PRIOR
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
-from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import Drive, led_by, prepare
 from aqualog.diagnose.evidence import Evidence, recentred
 from aqualog.diagnose.faster import faster, joined, with_rings
@@ -31,18 +30,24 @@ from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, value_
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
-from aqualog.diagnose.outcome import Outcome, conclude, with_causes
-from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, ResidualView, Verdict
-from aqualog.diagnose.search import Found, Tell, search, simulated
+from aqualog.diagnose.outcome import conclude, with_causes
+from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView, Verdict
+from aqualog.diagnose.refit import Refit
+from aqualog.diagnose.run_information import Rival
+from aqualog.diagnose.search import Found, Option, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unknown_term import as_term, short_form
+from aqualog.diagnose.verdict import Outcome
 from aqualog.diagnose.words import term_words, verdict_sentence
 from aqualog.model.term import Model
 
-__all__ = ["Options", "diagnose"]
+__all__ = ["Options", "accelerometer_defect", "diagnose"]
 
 LEAST_USED_S = 20.0
+LEAST_CORRELATION = 0.5
+LEAST_GAIN, MOST_GAIN = 0.5, 1.5  # bounds of an accelerometer's gain
+LEAST_MOTION = 0.1  # [m/s^2] sd of the change of the acceleration
 SAME = 0.2  # of what a signal changes by from sample to sample, a difference that is rounding
 # of twice the log-likelihood that an effect must gain to be more likely than none: its prior, and what its freedom
 # costs in the competition (2.5 nats (natural logarithm), typical of 300 s)
@@ -72,26 +77,11 @@ def diagnose(
     options: Options | None = None,
     progress: Tell | None = None,
 ) -> Diagnosis:
-    """Errors of the model on these drives, with their causes.
+    """Errors of the model on drives, each with its name, with their causes. The same for the same input and seed.
 
-    Parameters
-    ----------
-    drives : sequence of (name, Signals)
-        Measured with the same car in the same state; each has a noise of its own.
-    vehicle : Vehicle
-        The car as described in its vehicle file.
-    model : Model, optional
-        Terms that are known already.
-    holdout : sequence of (name, Signals)
-        Drives that are used only for the gain.
-    options : Options, optional
-    progress : callable, optional
-        Called with the name of the step and the share that is done.
-
-    Returns
-    -------
-    Diagnosis
-        The same for the same input and seed.
+    The drives were measured with the same car in the same state; each has a noise of its own. `model`: terms that are
+    known already; `holdout`: drives that are used only for the gain. `progress` gets the name of each step and the
+    share that is done.
 
     Raises
     ------
@@ -109,16 +99,17 @@ def diagnose(
         return _not_testable(ready, model, reason, notes, vehicle)
     if model.terms:
         ready = [led_by(d, model) for d in ready]
-    ready, model, bare, road, asked, untested, evidence, moved = _simulated(ready, model, tell)
-    notes += moved
+    evidence, model, bare, road, untested, moved = _simulated(ready, model, tell)
+    ready, notes = list(evidence.drives), notes + moved
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(found, model)
-    outcome, agreed = _by_drive(found, outcome, model)
-    noises = _noises(evidence, outcome)
+    chosen = outcome.best.option.refit if outcome.best else None
+    outcome, agreed = _by_drive(found, outcome, chosen, model)
+    noises = _noises(evidence, chosen)
     if road is not None:
         outcome = _with_road(outcome, road)
     is_named = any(c.effect == "road_grade" and "grade_rms" in c.parameters for c in outcome.causes)
-    extended = _extended(outcome, found, model if is_named else bare, asked)
+    extended = _extended(outcome, chosen, found.forms, model if is_named else bare, evidence.asked)
     names = {d.name for d in ready}
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
     outcome = joined(outcome, seen)
@@ -128,11 +119,12 @@ def diagnose(
     after = before if extended.terms == bare.terms else [_led(d, extended) for d in ready]
     differs, is_unclear = extended.terms != bare.terms, outcome.verdict == "cannot_tell"
     tell("searching for a run that distinguishes the causes" if is_unclear else "measuring the gain", 0.8)
+    rivals = [Rival(s.option.refit, q) for s, q in outcome.rivals if s.option.refit is not None]
     last: list[Callable[[], Any]] = []
     if differs:
         last.append(lambda: _gained(ready, holdout, vehicle, bare, extended, noises[0], options))
     if is_unclear:
-        last.append(lambda: next_manoeuvre(evidence, outcome.rivals, noises, model))
+        last.append(lambda: next_manoeuvre(evidence, rivals, noises, model))
     done = beside(lambda f: f(), last) if len(last) > 1 else [f() for f in last]
     gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
     return Diagnosis(
@@ -152,7 +144,7 @@ def diagnose(
         model=with_rings(extended, seen),
         channels=ready[0].channels,
         untested=untested | seen.untested,
-        notes=(*notes, *_unnamed(outcome, found, options), *outcome.small, *seen.notes),
+        notes=(*notes, *_unnamed(outcome, found, options), *outcome.notes, *seen.notes),
         views=_views(ready, before, after) if options.views else (),
         agreement=agreed if outcome.causes else (),
         caution=not_calibrated(vehicle),
@@ -160,15 +152,13 @@ def diagnose(
 
 
 class _Setting(NamedTuple):
-    """Drives with the model that the search starts from, and what it asks: `bare` is the model without the road."""
+    """What the search starts from: `bare` is the model without the road."""
 
-    ready: list[Drive]
+    evidence: Evidence
     model: Model
     bare: Model
     road: Profile | None
-    asked: tuple[Hypothesis, ...]
     untested: dict[str, str]
-    evidence: Evidence
     notes: tuple[str, ...]
 
 
@@ -185,29 +175,21 @@ def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
     evidence = simulated(ready, asked, model, tell)
     moved = recentred(evidence, model)
     if moved != model:
-        notes = _moved(moved, model)
-        bare = Model((*bare.terms, *(t for t in moved.terms if t not in model.terms)))
-        model, ready = moved, [led_by(d, moved) for d in ready]
+        new = tuple(t for t in moved.terms if t not in model.terms)
+        notes = tuple(f"The vehicle file is not sure of it, and the drives move it: {term_words(t)}." for t in new)
+        model, bare = moved, Model((*bare.terms, *new))
+        ready = [led_by(d, model) for d in ready]
         evidence = simulated(ready, asked, model, tell)
-    evidence = supported(around_water(evidence, model))
-    return _Setting(list(evidence.drives), model, bare, road, evidence.asked, untested, evidence, notes)
+    return _Setting(supported(around_water(evidence, model)), model, bare, road, untested, notes)
 
 
-def _moved(moved: Model, model: Model) -> tuple[str, ...]:
-    """A note on each value of the vehicle file that the drives moved."""
-    terms = (t for t in moved.terms if t not in model.terms)
-    return tuple(
-        f"The vehicle file is not sure of it, and the drives move it: {term_words(t)}." for t in terms
-    )  # fmt: skip
-
-
-def _noises(evidence: Evidence, outcome: Outcome) -> list[Noise]:
+def _noises(evidence: Evidence, chosen: Refit | None) -> list[Noise]:
     """Noise of each drive after the chosen set."""
-    quiet = evidence.residuals if outcome.chosen is None else outcome.chosen.residuals
+    quiet = evidence.residuals if chosen is None else chosen.residuals
     return [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, evidence.drives, strict=True)]
 
 
-def _sentence(outcome: Outcome, found: Found, options: Options, untested: Mapping[str, str]) -> str:
+def _sentence(outcome: Outcome[Option], found: Found, options: Options, untested: Mapping[str, str]) -> str:
     reason = f" ({short_form(found.forms[0])})" if found.forms else ""
     p = found.significance.p_value
     return verdict_sentence(
@@ -233,9 +215,10 @@ def _gained(
     )  # fmt: skip
 
 
-def _by_drive(found: Found, outcome: Outcome, model: Model) -> tuple[Outcome, tuple[Agreement, ...]]:
+def _by_drive(
+    found: Found, outcome: Outcome[Option], r: Refit | None, model: Model
+) -> tuple[Outcome[Option], tuple[Agreement, ...]]:
     """Values of the chosen set drive by drive; intervals grow where the drives differ."""
-    r = outcome.chosen
     if r is None:
         return outcome, ()
     agreed = agreements(found, r, np.array([value_in(model, r.members[i], n) for i, n in r.names]))
@@ -248,7 +231,7 @@ def _led(drive: Drive, model: Model) -> FloatArray:
     return residual(led_by(drive, model), model)
 
 
-def _with_road(outcome: Outcome, road: Profile) -> Outcome:
+def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
     cause, own = road.cause, outcome.causes
     if not road.is_large or cause.probability < SURE:
         sure = cause.probability >= SURE
@@ -258,7 +241,7 @@ def _with_road(outcome: Outcome, road: Profile) -> Outcome:
             else f"Probability {cause.probability:.2f}, not named"
         )
         note = f"{note}: {cause.sentence}"
-        return outcome._replace(small=(*outcome.small, note))
+        return outcome._replace(notes=(*outcome.notes, note))
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
         # one road: a constant slope is its mean, whose interval knows that it is an offset as well
         own = tuple(c for c in own if c.effect != cause.effect)
@@ -277,26 +260,28 @@ def _without_road(extended: Model, given: Model) -> Model:
     return Model(tuple(t for t in extended.terms if id(t) in own or t.effect.name != "unexplained_grade"))
 
 
-def _unnamed(outcome: Outcome, found: Found, options: Options) -> tuple[str, ...]:
+def _unnamed(outcome: Outcome[Option], found: Found, options: Options) -> tuple[str, ...]:
     p = found.significance.p_value
     if outcome.verdict != "no_effect" or p > options.level:
         return ()
     return (f"The test found more than noise (p = {p:.2g}), but no effect large enough to be worth naming.",)
 
 
-def _extended(outcome: Outcome, found: Found, model: Model, asked: Sequence[Hypothesis]) -> Model:
+def _extended(
+    outcome: Outcome[Option], best: Refit | None, forms: Sequence[Remainder], model: Model, asked: Sequence[Hypothesis]
+) -> Model:
     extended = model
     named = {c.key for c in outcome.causes}
     if outcome.verdict == "unexplained":
         extended = with_causes(model, [c for c in outcome.causes if c.key in {h.key for h in asked}], asked)
-    if (best := outcome.chosen) is not None:
+    if best is not None:
         # effects too small to be named are not put into the model either
         extended = with_values(model, [
             (h, {n: v for (i, n), v in zip(best.names, best.values.tolist(), strict=True) if best.members[i] is h})
             for h in best.members
             if h.key in named
         ])  # fmt: skip
-    terms = [as_term(r) for r in found.forms]
+    terms = [as_term(r) for r in forms]
     for term in terms:
         if term is not None and all(t.effect is not term.effect for t in extended.terms):
             extended = extended.with_term(term)
@@ -340,6 +325,24 @@ def _is_same(a: Drive, b: Drive) -> bool:
     )
 
 
+def accelerometer_defect(drive: Drive) -> Follow | None:
+    """Whether `a_x` is the car's longitudinal acceleration: its changes over 2 s against those of dv/dt.
+
+    None if it is, or if the speed changes too little for a judgement.
+    """
+    if "a_x" not in drive.columns:
+        return None
+    used = np.repeat(drive.mask, max(1, round(0.1 / drive.dt)) if drive.dt < 0.1 else 1)
+    # not the course's target: it leads the simulation of a car that is heavier than its file by more than the speed
+    a, v = drive.columns["a_x"], drive.speed
+    n = min(used.size, a.size)
+    found = follow(a[:n], v[:n], used[:n], drive.dt)
+    if found is None or found.motion < LEAST_MOTION:
+        return None
+    wrong = found.correlation < LEAST_CORRELATION or not LEAST_GAIN <= found.gain <= MOST_GAIN
+    return found if wrong else None
+
+
 def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> str:
     """Why the drives cannot be tested; empty if they can."""
     for d in ready:
@@ -363,9 +366,8 @@ def _not_testable(
     drives: Sequence[Drive], model: Model, reason: str, notes: tuple[str, ...], vehicle: Vehicle
 ) -> Diagnosis:
     return Diagnosis(
-        "not_testable", verdict_sentence("not_testable", (), level=0.0, reason=reason), tuple(d.name for d in drives),
-        sum(d.duration_s for d in drives), sum(d.used_s for d in drives), (), (), None, (), (), (), None, None, model,
-        drives[0].channels, {}, notes, caution=not_calibrated(vehicle),
+        "not_testable", f"Not testable: {reason}.", tuple(d.name for d in drives), sum(d.duration_s for d in drives),
+        sum(d.used_s for d in drives), model, drives[0].channels, notes=notes, caution=not_calibrated(vehicle),
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,13 +19,12 @@ from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in
 from aqualog.diagnose.manoeuvres import Run, Sensor, programme, turned
 from aqualog.diagnose.noise import Noise, bridged, for_mask, whitened
-from aqualog.diagnose.outcome import Rival
-from aqualog.diagnose.refit import PRIOR_WIDTH
+from aqualog.diagnose.refit import PRIOR_WIDTH, Refit
 from aqualog.model.log import as_signals
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Check, Model
 
-__all__ = ["Case", "Forecast", "entropy", "forecast", "of_check", "of_log", "of_run"]
+__all__ = ["Case", "Forecast", "Rival", "entropy", "forecast", "of_check", "of_log", "of_run"]
 
 STEP_S = 5e-3  # [s] of the integration
 DRAWS = 300  # of the run's data, for each set
@@ -32,6 +32,13 @@ SEED = 1
 # rms noise of channels that the log does not have yet, independent from second to second (K)
 _ASSUMED = {"force_balance": 0.1, "kinematic": 0.15, "lateral": 0.2, "tie_rod": 100.0}
 _ASSUMED_SPEED = 0.05  # [m/s] of all others
+
+
+class Rival(NamedTuple):
+    """A refitted set that remains, and its probability."""
+
+    refit: Refit
+    probability: float
 
 
 _Driven = tuple[Drive, list[FloatArray], dict[int, FloatArray]]
@@ -113,14 +120,8 @@ def forecast(case: Case, log: FloatArray, run: FloatArray, times: int, group: Fl
     data are drawn under each set in the space that all rows span, and each set's density gives the posterior. Of log
     and run a share of the likelihood counts, as in the verdict.
 
-    Parameters
-    ----------
-    case : Case
-    log, run : array (N, N)
-        Inner products of the rows of `of_log` and `of_run` or `of_check`.
-    times : int
-    group : array (S, S)
-        1 where a set (row) has the effects of a group (column): such sets are one cause.
+    `log`, `run` (N, N): inner products of the rows of `of_log`, and of `of_run` or `of_check`; `group` (S, S): 1 where
+    a set (row) has the effects of a group (column), since such sets are one cause.
     """
     size, turn = np.linalg.eigh(run * times)
     seen = size > 1e-9 * max(float(size[-1]), 1e-9)

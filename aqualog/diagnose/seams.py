@@ -89,16 +89,9 @@ class _Step(NamedTuple):
 def seams(signals: Signals, vehicle: Vehicle, *, seed: int = 1) -> tuple[Seam, ...]:
     """Jumps of the clock of accelerometer, wheels, reference velocity or torque, first ones first.
 
-    Parameters
-    ----------
-    signals : Signals
-        At the log's own rate.
-    vehicle : Vehicle
-        Radii only: a wrong gain does not matter.
-    seed : int
-        Of the permutations of windows that calibrate the test.
-
-    Limits: two jumps of one signal within half a minute are one; without acceleration there is nothing to see.
+    `signals` at the log's own rate; of the vehicle the radii only, a wrong gain does not matter; `seed` of the
+    permutations of windows that calibrate the test. Limits: two jumps of one signal within half a minute are one;
+    without acceleration there is nothing to see.
     """
     sources = _sources(signals, vehicle)
     slowness = _slowness(signals, vehicle)
@@ -301,7 +294,7 @@ def _named(steps: Sequence[_Step], sources: Sequence[str]) -> list[Seam]:
             s for s in left
             if s.first <= surest.last + NEAR_S and s.last >= surest.first - NEAR_S and set(s.pair) & set(surest.pair)
         ]  # fmt: skip
-        score = {s: _score(group, s) for s in sources}
+        score = {s: sum(s in step.pair for step in group) for s in sources}
         names = tuple(s for s in sources if score[s] == max(score.values()))
         if len(names) > 1:
             names, group = surest.pair, [surest]
@@ -311,7 +304,3 @@ def _named(steps: Sequence[_Step], sources: Sequence[str]) -> list[Seam]:
         out.append(Seam(placed.t, (placed.first, placed.last), size, names, surest.p))
         left = [s for s in left if s not in group]
     return out
-
-
-def _score(group: Sequence[_Step], source: str) -> int:
-    return sum(source in s.pair for s in group)

@@ -12,7 +12,7 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.competition import SCALES, Block, Packed, State, added, packed, scored, scores, start, values
 
 __all__ = [
-    "Fitted", "Grouped", "MayJoin", "Members", "Sets", "evidence_of", "first_of", "fitted_in", "grouped", "ranked",
+    "Fitted", "MayJoin", "Members", "Sets", "evidence_of", "first_of", "fitted_in", "ranked",
     "searched", "shares",
 ]  # fmt: skip
 
@@ -51,14 +51,6 @@ class Fitted:
     columns: list[int]
     mean: FloatArray
     covariance: FloatArray
-
-
-@dataclass(frozen=True, slots=True)
-class Grouped:
-    """Sets (indices) with the same names together, the most probable first, and the share of each name."""
-
-    groups: tuple[tuple[int, ...], ...]
-    marginal: Mapping[str, float]
 
 
 def fitted_in(blocks: Sequence[Block], inner: FloatArray, members: Sequence[int]) -> Fitted:
@@ -101,18 +93,6 @@ def shares(evidence: Sequence[float]) -> FloatArray:
     return np.asarray(p / p.sum())
 
 
-def grouped(names: Sequence[frozenset[str]], share: Sequence[float]) -> Grouped:
-    """Sets whose names are the same count together."""
-    groups: dict[frozenset[str], list[int]] = {}
-    marginal: dict[str, float] = {}
-    for i, (own, q) in enumerate(zip(names, share, strict=True)):
-        groups.setdefault(own, []).append(i)
-        for n in own:
-            marginal[n] = marginal.get(n, 0.0) + q
-    order = sorted(groups.values(), key=lambda g: -sum(share[i] for i in g))
-    return Grouped(tuple(tuple(g) for g in order), marginal)
-
-
 def first_of(
     blocks: Sequence[Block], inner: FloatArray, name: Callable[[int], str], beside: Members = ()
 ) -> list[int]:  # fmt: skip
@@ -134,15 +114,8 @@ def searched(
 ) -> dict[Members, float]:  # fmt: skip
     """Evidence of the sets that are visited: the best ones of each size carried on, then members exchanged.
 
-    Parameters
-    ----------
-    blocks : sequence of Block
-    inner : array (K + 1, K + 1)
-        Inner products of all columns, the residual last.
-    may_join : callable
-        Whether a block may join the set of a state.
-    width : int
-        Sets that are carried on.
+    `inner` (K + 1, K + 1): inner products of all columns, the residual last; `may_join`: whether a block may join the
+    set of a state; `width`: sets that are carried on.
     """
 
     together = packed(blocks)

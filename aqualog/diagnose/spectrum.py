@@ -90,14 +90,12 @@ def _unrelated(lines, inverse, out):  # type: ignore[no-untyped-def]
                 out[i, 1, c, at] = im[:n]
 
 
-def weighing(
-    residuals: Sequence[FloatArray] | FloatArray, mask: BoolArray, contrasts: FloatArray, noise: Noise | None = None
-) -> Weighing:  # fmt: skip
+def weighing(residuals: Sequence[FloatArray] | FloatArray, mask: BoolArray, contrasts: FloatArray) -> Weighing:
     """The weighing by the noise of residuals (C, n) from which known effects have been subtracted.
 
     Several residuals are draws of one: what is subtracted is not exactly known.
     """
-    noise = noise or fit_noise(residuals[0], mask, contrasts)
+    noise = fit_noise(residuals[0], mask, contrasts)
     used = np.asarray((noise.weights > 0.0).any(axis=0))
     count = int(used.sum())
     size = good_size(count)

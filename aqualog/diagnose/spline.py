@@ -61,18 +61,10 @@ class _Axis(NamedTuple):
 def basis(
     names: tuple[str, ...], z: Sequence[FloatArray], mask: BoolArray, dt: float, *, is_road: bool = False
 ) -> Basis | None:
-    """Functions of coordinates (n,) each; None where the drive does not vary them.
+    """Functions of one or two coordinates (n,) [SI], NaN where unknown; None where the drive does not vary them.
 
-    Parameters
-    ----------
-    names, z
-        One or two coordinates, SI; NaN where unknown: the function is zero there.
-    mask : (n,)
-        Samples that count.
-    dt : float
-        [s]
-    is_road : bool
-        Knots every 50 m.
+    The functions are zero where a coordinate is unknown. `mask` (n,): samples that count, at the step `dt` [s];
+    `is_road`: knots every 50 m.
     """
     known = mask & np.isfinite(np.sum(z, axis=0))
     if np.count_nonzero(known) < max(LEAST_FINITE * np.count_nonzero(mask), 2):

@@ -140,14 +140,8 @@ def moments(
     """Each effect that begins during the drive at each wheel, with the begin and duration that explain most.
 
     The response of the effect that `DriveSearch.begins_like` names, times a ramp, stands for it: no simulation of each
-    moment is needed. The noise is taken as white, for what is slow must not count as noise here.
-
-    Parameters
-    ----------
-    drive : Drive
-    residual : array (C, n)
-    asked, signatures : sequences
-        Of the other hypotheses, (k, C, n) each.
+    moment is needed. The noise is taken as white, for what is slow must not count as noise here. `residual` (C, n);
+    `asked` and their `signatures` (k, C, n): the other hypotheses.
     """
     white = white_noise(residual, drive.mask, contrasts(drive.channels)).rotation
     left = clipped(white @ residual, drive.mask)

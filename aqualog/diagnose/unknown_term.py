@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from aqualog.core.records import FloatArray
+from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.shapes import MECHANISMS, Mechanism
-from aqualog.diagnose.words import quantity
+from aqualog.diagnose.words import listed, quantity
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Term
 
@@ -97,8 +98,6 @@ _COORDINATES: dict[str, tuple[str, str]] = {
     "t": ("time", "s"),
     "water_depth": ("water depth", "m"),
     "ambient_temperature": ("air temperature", "K"),
-    "slip": ("slip", "-"),
-    "drive_sign": ("driving or braking", "-"),
     "steer_angle": ("steer angle", "rad"),
     "yaw_rate": ("yaw rate", "rad/s"),
     "since_braking": ("time since braking", "s"),
@@ -106,23 +105,18 @@ _COORDINATES: dict[str, tuple[str, str]] = {
     "pressure": ("tyre pressure", "Pa"),
     "load": ("load", "kg"),
 }
-_CHANNELS: dict[str, tuple[str, str]] = {
-    "force_balance": ("force balance", "m/s²"),
-    "kinematic": ("accelerometer against the change of speed", "m/s²"),
-    "lateral": ("lateral acceleration", "m/s²"),
-    "axle_slip": ("slip between the axles", "m/s"),
-    "side_slip_f": ("slip between the front wheels", "m/s"),
-    "side_slip_r": ("slip between the rear wheels", "m/s"),
-    **{f"slip_{w}": (f"slip {w}", "m/s") for w in ("fl", "fr", "rl", "rr")},
-    **{f"tie_rod_{w}": (f"tie rod {w}", "N") for w in ("fl", "fr")},
-}
+_CHANNELS = {
+    "kinematic": "accelerometer against the change of speed", "lateral": "lateral acceleration",
+    "axle_slip": "slip between the axles", "side_slip_f": "slip between the front wheels",
+    "side_slip_r": "slip between the rear wheels",
+}  # fmt: skip
 ALIKE = 0.9  # cosine from which a known effect looks nearly the same
 
 
 def describe(mechanism: Mechanism, r: Remainder) -> str:
     """Sentences: mechanism and coordinate, its largest value, coordinates that explain it as well, similar effects."""
-    title = _CHANNELS.get(r.channel, (r.channel, "?"))[0]
-    how = r.manner or f"goes with {' and '.join(_word(n) for n in r.depends_on)}"
+    title = _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title.lower() if r.channel in CHANNELS else r.channel)
+    how = r.manner or f"goes with {' and '.join(map(_word, r.depends_on))}"
     text = f"Unexplained: {mechanism.title} {how} (probability {r.probability:.2f}"
     text += f"; {r.share:.0%} of the variance of the {title}"
     sure = np.isfinite(r.f) & ((r.low > 0.0) | (r.high < 0.0))
@@ -132,7 +126,7 @@ def describe(mechanism: Mechanism, r: Remainder) -> str:
         text += f"; {quantity(float(r.f[at]), mechanism.unit, change=True)} at {there}"
     text += ")."
     if r.proxies:
-        text += f" It cannot be distinguished from {_list(r.proxies)} here."
+        text += f" It cannot be distinguished from {listed([*map(_word, r.proxies)])} here."
     # what comes again at equal ways does not at equal times, unless the speed never changes: then both are likely
     if {"t", "position"} & set(r.depends_on) and not r.manner.startswith(("in waves", "for ")):
         text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."
@@ -145,7 +139,7 @@ def describe(mechanism: Mechanism, r: Remainder) -> str:
 def short_form(remainder: Remainder) -> str:
     """`a force on the car that goes with speed`, `a force on the car from 66 s to 145 s`."""
     title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), remainder.channel)
-    how = remainder.manner or f"that goes with {' and '.join(_word(n) for n in remainder.depends_on)}"
+    how = remainder.manner or f"that goes with {' and '.join(map(_word, remainder.depends_on))}"
     return f"{title} {how}"
 
 
@@ -155,8 +149,3 @@ def _word(name: str) -> str:
 
 def _unit(name: str) -> str:
     return _COORDINATES.get(name, ("", "-"))[1]
-
-
-def _list(names: tuple[str, ...] | list[str]) -> str:
-    words = [_word(n) for n in names]
-    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from aqualog.diagnose.records import SURE, Alternative, Cause, Verdict, tempered
-from aqualog.diagnose.sets import grouped, shares
+from aqualog.diagnose.sets import shares
 from aqualog.diagnose.threads import beside
 
-__all__ = ["CREDIBLE", "PLACES", "Candidate", "Decision", "candidates", "decided", "whole"]
+__all__ = ["CREDIBLE", "PLACES", "Candidate", "Outcome", "candidates", "decided", "whole"]
 
 CREDIBLE = 20.0  # evidence ratio within which places of one effect cannot be distinguished
 PLACES = 5.0  # evidence ratio within which the whole car is preferred to a part of it
@@ -42,9 +42,8 @@ class Candidate(Generic[Option]):
         return frozenset(c.effect for c in self.large)
 
 
-@dataclass(frozen=True, slots=True)
-class Decision(Generic[Option]):
-    """Verdict, causes, alternatives; `best` None where there is no cause, `group` the sets of the same names.
+class Outcome(NamedTuple, Generic[Option]):
+    """Verdict, causes, alternatives; `best`: the set that the extended model is made of, None without causes.
 
     `certain`: effects beyond doubt; `rivals`: what remains, with its share, where the causes cannot be distinguished;
     `notes`: what is too small to be worth naming, what other places are as likely, what speaks against a name.
@@ -54,7 +53,6 @@ class Decision(Generic[Option]):
     causes: tuple[Cause, ...] = ()
     alternatives: tuple[Alternative, ...] = ()
     best: Candidate[Option] | None = None
-    group: tuple[Candidate[Option], ...] = ()
     certain: frozenset[str] = frozenset()
     rivals: tuple[tuple[Candidate[Option], float], ...] = ()
     notes: tuple[str, ...] = ()
@@ -78,31 +76,28 @@ def decided(
     sets: Sequence[Candidate[Option]],
     pick: Callable[[Sequence[Candidate[Option]]], Candidate[Option]],
     failing: Callable[[Candidate[Option]], Sequence[str]],
-) -> Decision[Option]:
+) -> Outcome[Option]:
     """The verdict on sets without an unknown form.
 
     A name needs a probability of 0.95. Else the answer is what the posterior consists of, up to 0.95. Sets whose causes
-    worth naming are the same count together.
-
-    Parameters
-    ----------
-    sets : sequence of Candidate
-    pick : callable
-        Which one of a group that differs in places only stands for it.
-    failing : callable
-        What speaks against naming a set's causes.
+    worth naming are the same count together: `pick` says which one of a group that differs in places only stands for
+    it, `failing` what speaks against naming a set's causes.
     """
-    together = grouped([s.names for s in sets], [s.share for s in sets])
-    ranked = [[sets[i] for i in g] for g in together.groups]
+    groups: dict[frozenset[str], list[Candidate[Option]]] = {}
+    marginal: dict[str, float] = {}
+    for s in sets:
+        groups.setdefault(s.names, []).append(s)
+        marginal.update({n: marginal.get(n, 0.0) + s.share for n in s.names})
+    ranked = sorted(groups.values(), key=lambda g: -sum(s.share for s in g))
     if not ranked or not ranked[0][0].names:
-        return Decision("no_effect", notes=_small(ranked[0][0]) if ranked else ())
+        return Outcome("no_effect", notes=_small(ranked[0][0]) if ranked else ())
     best, group = pick(ranked[0]), tuple(ranked[0])
-    own = _with_probability(best.large, together.marginal)
+    own = _with_probability(best.large, marginal)
     notes = _small(best) + _other_places(best, group)
     failed = failing(best)
     unsure = frozenset(c.effect for c in own if c.probability < SURE)
     if not unsure and not failed:
-        return Decision("named" if len(own) == 1 else "compound", own, (), best, group, best.names, (), notes)
+        return Outcome("named" if len(own) == 1 else "compound", own, (), best, best.names, (), notes)
     others, total = [], sum(s.share for s in group)
     rivals, rest = [(best, total)], []
     for g in ranked[1:]:
@@ -114,16 +109,14 @@ def decided(
     for g, picked in zip(rest, beside(pick, rest), strict=True):
         ratio = math.exp(min(max(group[0].evidence - g[0].evidence, 0.0), 700.0))
         rivals.append((picked, sum(s.share for s in g)))
-        others.append(Alternative(_with_probability(picked.large, together.marginal), ratio))
+        others.append(Alternative(_with_probability(picked.large, marginal), ratio))
     certain = frozenset() if failed else best.names - unsure
     # the best set whole, one effect at two places too; of the others what it does not have
     more = {c.effect: c for a in reversed(others) for c in a.causes if c.effect not in best.names}
     shown = sorted([*own, *more.values()], key=lambda c: c.effect not in certain)
     notes += tuple(f"Not named: {reason}" for reason in failed)
-    return Decision(
-        "cannot_tell", tuple(shown), tuple(others), best, group, certain,
-        tuple((s, q / total) for s, q in rivals), notes,
-    )  # fmt: skip
+    remain = tuple((s, q / total) for s, q in rivals)
+    return Outcome("cannot_tell", tuple(shown), tuple(others), best, certain, remain, notes)
 
 
 def _with_probability(causes: Sequence[Cause], marginal: Mapping[str, float]) -> tuple[Cause, ...]:

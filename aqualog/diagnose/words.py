@@ -88,7 +88,7 @@ def verdict_sentence(
     source: str = "log",
     untested: Mapping[str, str] | None = None,
 ) -> str:
-    """The verdict in one sentence.
+    """The verdict in one sentence, of a log that can be tested.
 
     `certain`: effects that are certain where others cannot be distinguished; `seen`: the test's p-value where it
     found more than noise; `source`: `log` or `campaign`; `untested`: effects that the log cannot show, and why.
@@ -122,7 +122,5 @@ def verdict_sentence(
             odds = "" if math.isnan(causes[0].probability) else f" (probability {causes[0].probability:.2f})"
             return f"The car may differ from the model, but this {source} does not make it certain: {names[0]}{odds}."
         return f"The car differs from the model, but this {source} cannot distinguish {listed(names)}."
-    if verdict == "unexplained":
-        known = f" beside {listed(names)}" if names else ""
-        return f"The car differs from the model{known} in a way that no effect of the library explains{reason}."
-    return f"Not testable: {reason}."
+    known = f" beside {listed(names)}" if names else ""
+    return f"The car differs from the model{known} in a way that no effect of the library explains{reason}."

@@ -350,9 +350,10 @@ def _of_campaign(
     if not runs.outcome.done:
         raise NothingUsableError([f"{name}: {reason}" for name, reason in runs.outcome.failed.items()])
     from aqualog.diagnose.campaign import diagnose_campaign
+    from aqualog.diagnose.run import Options
 
     configured = runs.campaign.configured
-    found = diagnose_campaign(configured.campaign, runs.data, model=known, progress=hear, **options)
+    found = diagnose_campaign(runs.data, known, options=Options(**options), progress=hear)
     from aqualog.checks.several import sentences
 
     names = dict.fromkeys(car.name for car in configured.vehicles.values())

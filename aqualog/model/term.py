@@ -105,12 +105,11 @@ class CampaignSearch:
     """How a diagnosis of a campaign searches for an effect: as number `order`, at `places` (None: all wheels).
 
     `driven`: only at axles that are driven. `sentence` names the place as `{place}` or `{Place}`, and the values, times
-    `scale`, as `{0.value}`, `{0.low}` and `{0.high}`; `title` is short.
+    `scale`, as `{0.value}`, `{0.low}` and `{0.high}`.
     """
 
     order: int
     places: tuple[str | None, ...]
-    title: str
     sentence: str
     driven: bool = False
     scale: float = 1.0

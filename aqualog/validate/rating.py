@@ -12,11 +12,11 @@ import numpy as np
 
 from aqualog.core.compiled import compiled
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.gain import corridor_share
 
 __all__ = ["LEAST_SAMPLES", "Rating", "rating"]
 
 LEAST_SAMPLES = 30  # so that a shift of 20 % leaves enough to compare
+INNER, OUTER = 0.05, 0.5  # corridors, of the largest measured value
 MOST_SHIFT = 0.2  # of the length
 EPS_M = 0.5  # relative error of the magnitude at which its rating is 0
 EPS_S = 2.0  # the same of the slope
@@ -64,12 +64,20 @@ def rating(reference: FloatArray, simulated: FloatArray) -> Rating:
     measured, moved = _overlapping(reference, simulated, shift)
     most = MOST_SHIFT * reference.size
     return Rating(
-        corridor_share(simulated, reference),
+        _corridor(reference, simulated),
         float(max(0.0, (most - abs(shift)) / most)),
         magnitude(measured, moved),
         slope(measured, moved),
         shift,
     )
+
+
+def _corridor(reference: FloatArray, simulated: FloatArray) -> float:
+    largest = float(np.abs(reference).max())
+    if largest == 0.0:
+        return float("nan")
+    off = np.abs(simulated - reference) / largest
+    return float((np.clip((OUTER - off) / (OUTER - INNER), 0.0, 1.0) ** 2).mean())
 
 
 def _shift(reference: FloatArray, simulated: FloatArray) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from aqualog.diagnose.campaign import diagnose_campaign
+from aqualog.diagnose.run import Options
 from tests.blind.level_world import CAR, CAR_AWD, Hidden, world
 
 BOTH = ("f", "r")
@@ -57,7 +58,7 @@ def main():
             car = CAR_AWD if k % 3 == 2 else CAR
             data = world(seed, hidden, car=car)
             begin = time.perf_counter()
-            r = diagnose_campaign(data.configured.campaign, data, seed=seed)
+            r = diagnose_campaign(data, options=Options(seed=seed))
             first = {c.effect: next(iter(c.parameters.values())) for c in r.causes}
             covered = {e: first[e].low <= x <= first[e].high for e, x in sizes.items() if e in first}
             rows.append({

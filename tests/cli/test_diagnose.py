@@ -216,8 +216,8 @@ def test_a_name_with_a_line_in_it_is_no_line_of_the_model(run, folder):
 def test_a_campaign_goes_to_the_other_level(run, folder, monkeypatch):
     asked = []
 
-    def fake(campaign, data, *, seed, level, model, progress, **drawn):
-        asked.append((campaign.name, len(data.runs), seed, level, model, drawn))
+    def fake(data, model, *, options, progress):
+        asked.append((data.name, len(data.runs), model, options))
         progress("binning")
         return replace(cases()["named"], drives=("c",))
 
@@ -228,14 +228,14 @@ def test_a_campaign_goes_to_the_other_level(run, folder, monkeypatch):
         folder / "campaign.toml", "--seed", 3, "--json", "--page", folder / "p.html", vehicle=False
     )  # fmt: skip
     assert code in (0, 3), err
-    assert asked == [("c", 1, 3, 0.01, Model(), {})]
+    assert asked == [("c", 1, Model(), engine.Options(seed=3))]
     assert json.loads(text)["verdict"] == "named"
     assert (folder / "p.html").exists()
     code, _, err = run(folder / "campaign.toml", "--no-bootstrap", vehicle=False)
     assert code == 2
     assert "--no-bootstrap does not apply to a campaign" in err
     run(folder / "campaign.toml", "--surrogates", 200, vehicle=False)
-    assert asked[1][-1] == {"surrogates": 200}
+    assert asked[1][-1].surrogates == 200
     code, _, err = run(folder / "campaign.toml")
     assert code == 2
     assert "vehicle beside a campaign" in err

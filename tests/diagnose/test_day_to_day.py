@@ -8,8 +8,8 @@ import pytest
 
 from aqualog.core.vehicle import Provenance
 from aqualog.diagnose.arena import arena_of, known_only
-from aqualog.diagnose.day_to_day import as_value, day_to_day
 from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.file_values import as_value, day_to_day
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import simulated

@@ -4,8 +4,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.diagnose.defects import accelerometer_defect
 from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.run import accelerometer_defect
 from tests.diagnose.test_drive import CAR, changed, plain, signals, term
 
 

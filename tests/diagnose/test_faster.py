@@ -16,9 +16,9 @@ from aqualog.diagnose.faster import (
     without_known,
 )
 from aqualog.diagnose.full_rate import PerTurn
-from aqualog.diagnose.outcome import Outcome
 from aqualog.diagnose.records import Cause
 from aqualog.diagnose.seams import Seam
+from aqualog.diagnose.verdict import Outcome
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 from tests.diagnose.test_drive import CAR, term

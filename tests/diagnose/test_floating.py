@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from aqualog.diagnose.channels import centre_line_speeds
-from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.floating import BEYOND_GRIP
+from aqualog.diagnose.drive import BEYOND_GRIP, prepare
 from aqualog.model.scenario import Lane
 from aqualog.model.sensors import IDEAL
 from tests.diagnose.test_drive import CAR, changed, signals, term

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aqualog.diagnose.isolate import confusions, limits, p_correct, reference_sizes, separation
+from aqualog.diagnose.isolate import confusions, limits, p_correct, reference_sizes
 from tests.diagnose.test_subsets import ASKED, AT, bench_of, plain, waves
 
 THRESHOLD = 20.0
@@ -95,15 +95,6 @@ def test_what_is_never_seen_has_no_limit():
     assert np.isnan(found["road_grade"])
     _, _, told = judged(b)
     assert all(c.effect != "road_grade" and "road_grade" not in c.rivals for c in told)
-
-
-def test_separation_is_what_a_projection_leaves():
-    rng = np.random.default_rng(2)
-    A = rng.standard_normal((3, 50))
-    G = A @ A.T
-    rest = A[0] - A[1:].T @ np.linalg.lstsq(A[1:].T, A[0])[0]
-    assert separation(G, (0,), (1, 2), np.array([2.0])) == pytest.approx(4.0 * rest @ rest)
-    assert separation(G, (0,), (), np.array([2.0])) == pytest.approx(4.0 * G[0, 0])
 
 
 def test_the_chance_of_the_right_one():

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from aqualog.diagnose.judge import repeats
 from aqualog.diagnose.noise import fit_noise
+from aqualog.diagnose.outcome import repeats
 from aqualog.diagnose.records import tempered
 from aqualog.model.term import Model
 from tests.diagnose.test_unexplained import arena

@@ -15,6 +15,7 @@ from aqualog.diagnose.campaign.expect import Driven, respond
 from aqualog.diagnose.campaign.noise import fit
 from aqualog.diagnose.campaign.observe import passes_of
 from aqualog.diagnose.campaign.passes import expected_values
+from aqualog.diagnose.run import Options
 from aqualog.diagnose.search import DOUBT
 from aqualog.model.effects import EFFECTS
 from aqualog.model.log import as_signals
@@ -128,7 +129,7 @@ def test_track_clearing_is_named(cleared, monkeypatch):
     taken = []
     monkeypatch.setattr(outcome, "estimates", lambda *given: taken.append(given) or refit.estimates(*given))
     found, again = (
-        diagnose_campaign(cleared.configured.campaign, cleared, seed=1, surrogates=19) for _ in range(2)
+        diagnose_campaign(cleared, options=Options(surrogates=19)) for _ in range(2)
     )  # fmt: skip
     assert (again.sentence, again.significance) == (found.sentence, found.significance)
     assert found.verdict == "named", found.sentence
@@ -151,14 +152,14 @@ def test_track_clearing_is_named(cleared, monkeypatch):
 @pytest.mark.nightly
 @pytest.mark.xfail(strict=True, reason="20 % low: the contact fluctuates as fast as a wheel's slip answers")
 def test_the_interval_of_track_clearing_holds_its_size(cleared):
-    found = diagnose_campaign(cleared.configured.campaign, cleared, seed=1, surrogates=19)
+    found = diagnose_campaign(cleared, options=Options(surrogates=19))
     size = found.causes[0].parameters["delta_film"]
     assert size.low < 6e-4 < size.high
 
 
 def test_nothing_hidden_is_told_as_nothing():
     data = simulated(Model(), 6)
-    found = diagnose_campaign(data.configured.campaign, data, seed=1, surrogates=39)
+    found = diagnose_campaign(data, options=Options(surrogates=39))
     assert found.verdict == "no_effect", found.sentence
     assert found.causes == ()
     shown = {(x.effect, x.where): x.size for x in found.limits}
@@ -168,7 +169,7 @@ def test_nothing_hidden_is_told_as_nothing():
 
 def test_a_hump_of_no_effect_is_an_unknown_form():
     data = world(119, Hidden(hump=0.08))
-    found = diagnose_campaign(data.configured.campaign, data, seed=1, surrogates=99)
+    found = diagnose_campaign(data, options=Options(surrogates=99))
     assert found.verdict == "unexplained", found.sentence
     assert found.causes == ()
     form = found.remainders[0]
@@ -180,7 +181,7 @@ def test_a_hump_of_no_effect_is_an_unknown_form():
 
 def test_few_runs_are_not_testable():
     data = world(3, runs=6)
-    found = diagnose_campaign(data.configured.campaign, data)
+    found = diagnose_campaign(data)
     assert found.verdict == "not_testable"
     assert "at least 12" in found.notes[0]
 

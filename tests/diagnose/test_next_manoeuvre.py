@@ -16,8 +16,8 @@ from aqualog.diagnose.hypotheses import hypotheses, residual
 from aqualog.diagnose.manoeuvres import KMH, RUNS, programme, turned
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import fit_noise
-from aqualog.diagnose.outcome import Rival
 from aqualog.diagnose.refit import metric, refit
+from aqualog.diagnose.run_information import Rival
 from aqualog.diagnose.search import simulated
 from aqualog.diagnose.spectrum import weighing
 from aqualog.model.effects import EFFECTS

@@ -89,8 +89,8 @@ def test_two_sets_that_share_the_posterior_cannot_be_told_apart():
     assert names(o) == ["payload_mass", "torque_gain"]
     assert [a.evidence_ratio for a in o.alternatives] == [pytest.approx(3.0)]
     assert [c.probability for c in o.causes] == pytest.approx([0.75, 0.25], abs=0.01)
-    assert o.chosen.members[0].key == "payload_mass"
-    assert [r.probability for r in o.rivals] == pytest.approx([0.75, 0.25], abs=0.01)
+    assert o.best.option.refit.members[0].key == "payload_mass"
+    assert [q for _, q in o.rivals] == pytest.approx([0.75, 0.25], abs=0.01)
 
 
 def test_what_all_sets_have_comes_first():
@@ -111,7 +111,7 @@ def test_places_of_one_effect_are_one_cause():
     o = told(option(sharp=-5.0, tyre_radius_fl=0.01), option(SURE - 0.7, tyre_radius_f=0.01))
     assert o.verdict == "named"
     assert names(o) == ["tyre_radius@fl"]
-    assert any(n.startswith("Equally possible: ") and "front axle" in n for n in o.small)
+    assert any(n.startswith("Equally possible: ") and "front axle" in n for n in o.notes)
 
 
 @pytest.mark.parametrize(("worse", "place"), [(0.0, "tyre_radius@f"), (8.0, "tyre_radius@f"), (12.0, "tyre_radius@fl")])
@@ -133,20 +133,20 @@ def test_one_effect_at_two_places_has_to_be_likelier_with_all_tolerances_too():
 def test_what_would_stand_at_a_bound_is_said_and_not_named():
     o = told(replace(option(payload_mass=200.0), beyond=option(slip_stiffness_r=2.5).members))
     assert names(o) == ["payload_mass"]
-    assert o.small[-1].startswith("Not named: slip stiffness (rear axle) would stand at its physical bound.")
+    assert o.notes[-1].startswith("Not named: slip stiffness (rear axle) would stand at its physical bound.")
 
 
 def test_what_is_too_small_is_said_and_not_named():
     o = told(option(payload_mass=10.0))
-    assert (o.verdict, o.causes, o.chosen) == ("no_effect", (), None)
-    assert "too small to be worth naming: The car weighed 10 kg more" in o.small[0]
+    assert (o.verdict, o.causes, o.best) == ("no_effect", (), None)
+    assert "too small to be worth naming: The car weighed 10 kg more" in o.notes[0]
 
 
 def test_a_small_member_beside_a_large_one_is_left_out():
     o = told(option(payload_mass=10.0, tyre_radius_fl=0.01))
     assert o.verdict == "named"
     assert names(o) == ["tyre_radius@fl"]
-    assert len(o.small) == 1
+    assert len(o.notes) == 1
 
 
 def test_a_value_is_judged_against_the_model_at_hand():
@@ -176,7 +176,7 @@ def test_a_failed_check_forbids_a_name(monkeypatch):
     monkeypatch.setattr(outcome, "repeats", lambda *_: ("it has the other sign in the last third of the drive.",))
     o = told(option(payload_mass=200.0))
     assert o.verdict == "cannot_tell"
-    assert o.small[-1].startswith("Not named: it has")
+    assert o.notes[-1].startswith("Not named: it has")
     assert o.certain == frozenset()
 
 
@@ -188,7 +188,7 @@ def test_what_is_not_named_and_makes_the_channels_larger_is_noise(monkeypatch):
     assert told(option(SURE - 8.0, signatures=against, payload_mass=200.0)).verdict == "no_effect"
     monkeypatch.setattr(outcome, "repeats", lambda *_: ("a value stands at its physical bound.",))
     o = told(option(signatures=against, payload_mass=200.0))
-    assert (o.verdict, o.causes, o.small[-1]) == ("no_effect", (), "Not named: a value stands at its physical bound.")
+    assert (o.verdict, o.causes, o.notes[-1]) == ("no_effect", (), "Not named: a value stands at its physical bound.")
     rivals = option(signatures=against, payload_mass=200.0), option(SURE - 0.7, torque_gain=0.9)
     assert told(*rivals).verdict == "cannot_tell"
 

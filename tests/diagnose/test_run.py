@@ -71,6 +71,8 @@ def test_named_with_its_size_and_gain():
     assert d.gain.log_score > 0.0
     force = next(c for c in d.gain.channels if c.channel == "force_balance")
     assert force.rmse_after < 0.5 * force.rmse_before
+    speed = next(c for c in d.gain.channels if c.channel == "speed")
+    assert speed.free_after < 0.5 * speed.free_before
     assert d.model.terms[0].values["delta_mass"] == pytest.approx(e.value)
 
 

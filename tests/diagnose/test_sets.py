@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aqualog.diagnose.competition import Block
-from aqualog.diagnose.sets import evidence_of, first_of, fitted_in, grouped, ranked, searched
+from aqualog.diagnose.sets import evidence_of, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.unexplained import clear_forms
 
 RNG = np.random.default_rng(5)
@@ -53,14 +53,6 @@ def test_a_block_that_may_not_join_does_not():
     assert (1, 3) not in sets
     assert (1,) in sets
     assert (3,) in sets
-
-
-def test_sets_of_the_same_names_count_together():
-    names = [frozenset("a"), frozenset("ab"), frozenset("a")]
-    found = grouped(names, [0.3, 0.4, 0.3])
-    assert found.groups == ((0, 2), (1,))
-    assert found.marginal["a"] == pytest.approx(1.0)
-    assert found.marginal["b"] == pytest.approx(0.4)
 
 
 def test_a_form_is_clear_where_no_effect_explains_it():

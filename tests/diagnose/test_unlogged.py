@@ -7,7 +7,7 @@ import pytest
 
 from aqualog.core.notation import WHEELS
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.unlogged import brakes_unlogged, needed_torque, roll_out
+from aqualog.diagnose.inputs import brakes_unlogged, needed_torque, roll_out
 from aqualog.model.follow import follow
 from aqualog.model.scenario import Steering
 from aqualog.model.term import Model

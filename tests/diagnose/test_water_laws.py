@@ -11,8 +11,7 @@ from aqualog.core.vehicle import WaterNumber
 from aqualog.diagnose import search
 from aqualog.diagnose.arena import arena_of, known_only
 from aqualog.diagnose.compete import compete
-from aqualog.diagnose.drive import prepare, rolling_under, stretches
-from aqualog.diagnose.floating import BEYOND_GRIP
+from aqualog.diagnose.drive import BEYOND_GRIP, prepare, rolling_under, stretches
 from aqualog.diagnose.hypotheses import hypotheses, signatures
 from aqualog.diagnose.on_water import around_water, of_water
 from aqualog.diagnose.refit import KNOWN, metric, refit

@@ -12,9 +12,8 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import blocks_of
 from aqualog.diagnose.campaign.catalogue import Library, library
-from aqualog.diagnose.campaign.forms import explained, shapes_of
 from aqualog.diagnose.campaign.noise import Fit, fit, inner
-from aqualog.diagnose.campaign.passes import Passes
+from aqualog.diagnose.campaign.passes import RESISTANCE, Passes
 from aqualog.diagnose.campaign.refit import Refit, refit
 from aqualog.diagnose.compete import rule
 from aqualog.diagnose.competition import COARSE, Block, added, start
@@ -22,7 +21,8 @@ from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.sets import Members, Sets, fitted_in, ranked, searched
-from aqualog.diagnose.shapes import Shape
+from aqualog.diagnose.shapes import Mechanism, Shape
+from aqualog.diagnose.spline import basis
 from aqualog.diagnose.unexplained import clear_forms, described
 from aqualog.model.term import Model
 
@@ -30,6 +30,12 @@ __all__ = ["Found", "Option", "compete"]
 
 ROUNDS = 3  # of the competition around its own best set
 COVERED, REFITTED = 0.999, 10  # share of the posterior that is refitted, and the most sets
+OVER = (("v_x",), ("depth",), ("pressure",), ("load",))
+USUAL = 0.2  # of the channel's rms
+TITLES = {
+    "f": "the slip of the front wheels", "r": "the slip of the rear wheels", "left": "the slip of the left wheels",
+    "right": "the slip of the right wheels", RESISTANCE: "the resistance of the water",
+}  # fmt: skip
 
 
 class Option(NamedTuple):
@@ -106,7 +112,7 @@ def compete(
     """
     say("signatures of the effects")
     lib = library(passes, given, asked, given)
-    shapes, functions = shapes_of(passes)
+    shapes, functions = _shapes_of(passes)
     ring = _Ring(passes, given, lib.evidence, *blocks_of(lib.evidence, shapes), shapes, functions)
     y = passes.values - lib.base
     nothing = Refit((), np.zeros(0), given, y, np.zeros((*y.shape, 0)), at_bound=False)
@@ -174,7 +180,7 @@ def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...]
         own = [i for m in c.own for i in ring.blocks[m].columns]
         form = ring.functions[:, :, [i - k for i in own]] @ linear.mean[[linear.columns.index(i) for i in own]]
         name = ring.shapes[ring.blocks[c.first].tag].mechanism.name
-        out.append(described(ring, sets, gram, linear, c, name, explained(passes, name, stand.y, form), seed))
+        out.append(described(ring, sets, gram, linear, c, name, _explained(passes, name, stand.y, form), seed))
     return tuple(out), stand
 
 
@@ -198,3 +204,36 @@ def _evidence(ring: _Ring, stand: _Stand, found: Refit, members: Members) -> flo
         state = added(state, m, replace(b, columns=tuple(range(at, at + len(b.columns)))))
         at += len(b.columns)
     return state.evidence - 0.5 * cost
+
+
+def _shapes_of(passes: Passes) -> tuple[tuple[Shape, ...], FloatArray]:
+    """Functions by which slip or resistance may depart from the model, and their columns (g, c, K) at a usual size."""
+    wet = np.asarray(np.isfinite(passes.values[:, -1]))
+    shapes, columns = [], [np.zeros((*passes.values.shape, 0))]
+    for name, channels in _channels(passes.names).items():
+        usual = USUAL * float(np.sqrt(np.nanmean(passes.values[:, channels] ** 2)))
+        unit = "m/s^2" if name == RESISTANCE else "-"
+        mechanism = Mechanism(name, TITLES[name.removeprefix("slip_slope_")], name, unit, usual, 0.0, OVER)
+        response = np.zeros((len(passes.names), 1))
+        response[channels] = usual
+        for names in OVER:
+            found = basis(names, [passes.coordinates[n] for n in names], wet, 1.0)
+            if found is not None:
+                shapes.append(Shape(mechanism, names, found))
+                columns.append(found.columns[:, None, :] * response)
+    return tuple(shapes), np.concatenate(columns, axis=-1)
+
+
+def _channels(names: Sequence[str]) -> dict[str, list[int]]:
+    """Columns of the observations by what departs: an axle's slip, a side's, the resistance."""
+    slips = [i for i, n in enumerate(names) if n.startswith("slip_slope_")]
+    out = {f"slip_slope_{a}": [i for i in slips if names[i][-2] == a] for a in "fr"}
+    out |= {f"slip_slope_{s}": [i for i in slips if names[i][-1] == s[0]] for s in ("left", "right")}
+    out[RESISTANCE] = [names.index(RESISTANCE)]
+    return {n: c for n, c in out.items() if c}
+
+
+def _explained(passes: Passes, name: str, y: FloatArray, form: FloatArray) -> float:
+    """Share of the variance of `y` (g, c), where a mechanism acts, that a form (g, c) explains."""
+    c = _channels(passes.names)[name]
+    return max(1.0 - float(np.nanvar((y - form)[:, c]) / np.nanvar(y[:, c])), 0.0)

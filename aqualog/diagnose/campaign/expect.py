@@ -58,20 +58,11 @@ class Response(NamedTuple):
 
 
 def respond(setups: Sequence[Setup], which: NDArray[np.int64], wet: NDArray[np.bool_], driven: Driven) -> Response:
-    """Steady response of cars.
+    """Steady response of cars with plants and scenarios, terms applied; the first stretch of each is its water.
 
-    Parameters
-    ----------
-    setups : sequence of Setup
-        Plants and scenarios, terms applied; the first stretch of each is its water.
-    which : int array (n,)
-        Setup of each sample.
-    wet : bool array (n,)
-        On the water, or on dry road.
-    driven : Driven
-
-    The equations omit the wheels' inertia, the pitch of the body, and the drag and wake of a stopped wheel. Near full
-    aquaplaning, where `lost` is not 0, these are no longer small.
+    `which` (n,): setup of each sample; `wet` (n,): on the water, or on dry road. The equations omit the wheels'
+    inertia, the pitch of the body, and the drag and wake of a stopped wheel. Near full aquaplaning, where `lost` is not
+    0, these are no longer small.
     """
     plants = [flat(s.plant) for s in setups]
     cars, wheels = (np.concatenate([p[i] for p in plants]) for i in (0, 1))

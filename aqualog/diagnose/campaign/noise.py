@@ -43,18 +43,9 @@ def prior_of(free: int, tested: int = 0) -> FloatArray:
 def fit(y: FloatArray, x: FloatArray, road: FloatArray, free: FloatArray, start: Fit | None = None) -> Fit:
     """Sizes and scatter by restricted likelihood (EM).
 
-    Parameters
-    ----------
-    y : array (g, c)
-        NaN where not available.
-    x, free : array (g, c, k)
-        Columns whose sizes have a unit prior, and those of `prior_of`.
-    road : array (g, c)
-        Variances.
-    start : Fit, optional
-        From where to go on; a good one needs few rounds.
-
-    The uncertainty of the sizes goes into the scatter, so that many columns do not make it small.
+    `y` (g, c), NaN where not available; `x`, `free` (g, c, k): columns whose sizes have a unit prior, and those of
+    `prior_of`; `road` (g, c): variances; `start`: from where to go on, a good one needs few rounds. The uncertainty of
+    the sizes goes into the scatter, so that many columns do not make it small.
     """
     known = np.isfinite(y)
     X = np.where(known[:, :, None], np.nan_to_num(np.concatenate([free, x], axis=-1)), 0.0)

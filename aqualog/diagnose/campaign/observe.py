@@ -42,14 +42,8 @@ class _Row(NamedTuple):
     seconds: float
 
 
-def passes_of(data: CampaignData, base: Vehicle | None = None) -> Passes:
+def passes_of(data: CampaignData) -> Passes:
     """Observations of all runs that are done and whose configuration the model knows.
-
-    Parameters
-    ----------
-    data : CampaignData
-    base : Vehicle, optional
-        In place of the runs' vehicle files, without load.
 
     A run counts once, however many samples it has: they are averaged. A run is left out where a wheel of the base model
     loses nearly all of its contact. The measurement plays no part, so that noise does not influence the choice.
@@ -57,7 +51,7 @@ def passes_of(data: CampaignData, base: Vehicle | None = None) -> Passes:
     left_out: Counter[str] = Counter()
     rows = []
     for info in data.done:
-        found = _row(data, info, base)
+        found = _row(data, info)
         if isinstance(found, str):
             left_out[found] += 1
         else:
@@ -73,8 +67,8 @@ def passes_of(data: CampaignData, base: Vehicle | None = None) -> Passes:
     )  # fmt: skip
 
 
-def _row(data: CampaignData, info: RunInfo, base: Vehicle | None) -> _Row | str:
-    scenario = _scenario(data, info, base)
+def _row(data: CampaignData, info: RunInfo) -> _Row | str:
+    scenario = _scenario(data, info)
     if isinstance(scenario, str):
         return scenario
     samples = data.samples(info)
@@ -116,7 +110,7 @@ def _change(x: FloatArray, dry: Index, wet: Index) -> tuple[float, float]:
     return level, float(np.nanmean(x[wet])) - level if wet.size and np.isfinite(x[wet]).any() else 0.0
 
 
-def _scenario(data: CampaignData, info: RunInfo, base: Vehicle | None) -> Scenario | str:
+def _scenario(data: CampaignData, info: RunInfo) -> Scenario | str:
     """The run as a scenario of the simulation: car, tyres, pressures, loads and an endless lane."""
     told = info.run.values
     tyre = TYRES.get(str(told.get("tyre", "")))
@@ -129,7 +123,7 @@ def _scenario(data: CampaignData, info: RunInfo, base: Vehicle | None) -> Scenar
     if not isinstance(depth, float):
         return "the water depth is not given"
     left = told.get("water_depth_left_mm", depth)
-    car = base or data.configured.vehicles[info.run.vehicle]
+    car = data.configured.vehicles[info.run.vehicle]
     loads = loads_of(info.run)
     lanes = (Lane(0.0, 1e9, depth_left=float(left) * 1e-3, depth_right=depth * 1e-3),) if depth > 0.0 else ()
     return Scenario(car, tyre, tyre, front * 1e5, rear * 1e5, loads[0], loads[1], lanes=lanes)

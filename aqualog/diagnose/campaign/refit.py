@@ -56,21 +56,10 @@ class Refit:
 def refit(
     passes: Passes, given: Model, members: Sequence[Hypothesis], start: FloatArray, x: FloatArray, weight: FloatArray
 ) -> Refit:
-    """Fit a set by Gauss-Newton with the prior of each parameter, within its physical bounds.
+    """Fit a set by Gauss-Newton with the prior of each parameter, within its physical bounds, on a given model.
 
-    Parameters
-    ----------
-    passes : Passes
-    given : Model
-        On which the set comes.
-    members : sequence of Hypothesis
-        Empty for the model as it is.
-    start : array (k,)
-        In prior standard deviations.
-    x : array (g, c, k)
-        Change of the observations by one of those near the start.
-    weight : array (g, c, c)
-        Precision of each run.
+    `members`: empty for the model as it is; `start` (k,): in prior standard deviations; `x` (g, c, k): change of the
+    observations by one of those near the start; `weight` (g, c, c): precision of each run.
     """
     names = [(h, n) for h in members for n in h.free]
     told = [h.parameter(n) for h, n in names]

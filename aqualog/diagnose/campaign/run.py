@@ -7,24 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from aqualog.campaign.definition import Campaign
 from aqualog.campaign.results import CampaignData
 from aqualog.core.records import FloatArray
-from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
-from aqualog.diagnose.any_effect import SURROGATES
 from aqualog.diagnose.campaign.advice import advice
 from aqualog.diagnose.campaign.catalogue import hypotheses, untested
 from aqualog.diagnose.campaign.compete import Found, Option, compete
-from aqualog.diagnose.campaign.gain import gain
 from aqualog.diagnose.campaign.observe import passes_of
 from aqualog.diagnose.campaign.outcome import conclude
 from aqualog.diagnose.campaign.passes import RESISTANCE, Passes, doubted, steady
 from aqualog.diagnose.campaign.refit import settled
 from aqualog.diagnose.hypotheses import with_values
 from aqualog.diagnose.records import Diagnosis, Gain, ResidualView
+from aqualog.diagnose.run import Options
 from aqualog.diagnose.unknown_term import short_form
-from aqualog.diagnose.verdict import Decision
+from aqualog.diagnose.verdict import Outcome
 from aqualog.diagnose.words import verdict_sentence
 from aqualog.model.term import Model
 
@@ -32,89 +29,54 @@ __all__ = ["diagnose_campaign"]
 
 LEAST_RUNS = 12
 
-Progress = Callable[[str], None]
-
 
 def diagnose_campaign(
-    campaign: Campaign,
     data: CampaignData,
-    vehicle: Vehicle | None = None,
-    *,
-    seed: int = 1,
-    level: float = 0.01,
-    surrogates: int = SURROGATES,
     model: Model | None = None,
-    progress: Progress | None = None,
+    *,
+    options: Options | None = None,
+    progress: Callable[[str], None] = lambda _what: None,
 ) -> Diagnosis:
-    """Name the errors of the tyre and water model over a campaign.
-
-    Parameters
-    ----------
-    campaign : Campaign
-        For its name.
-    data : CampaignData
-        Its results (`aqualog.campaign.results.load_results`).
-    vehicle : Vehicle, optional
-        In place of the runs' vehicle files, without load.
-    seed : int
-        Of the draws; the same seed gives the same diagnosis.
-    level : float
-        Family-wise probability of a finding where no effect is present.
-    surrogates : int
-        Draws of noise that the test is calibrated with; 0: Bonferroni's bound [bonferroni1936].
-    model : Model, optional
-        Terms that are known already.
-    progress : callable, optional
-        Called with the name of each step.
-
-    Returns
-    -------
-    Diagnosis
-        Channels `slip_slope_<wheel>` and `resistance`. `duration_s`: driving on water of all runs; `used_s`: the part
-        that was used.
+    """Name the errors of the tyre and water model over a campaign, from its results; `model`: terms that are known
+    already.
 
     A run is the independent unit throughout: each is one vector of means, its slips and resistance on water minus those
-    on dry road. It is compared with the model's expectation at the driven speed and traction.
+    on dry road. It is compared with the model's expectation at the driven speed and traction. Channels are
+    `slip_slope_<wheel>` and `resistance`. `duration_s`: driving on water of all runs; `used_s`: the part that was used.
     """
-    say = progress or (lambda what: None)
-    given = model or Model()
-    say("reading the runs")
-    passes = passes_of(data, vehicle)
+    o, given = options or Options(), model or Model()
+    progress("reading the runs")
+    passes = passes_of(data)
     wet = int(np.isfinite(passes.values[:, -1]).sum()) if passes.values.size else 0
     if wet < LEAST_RUNS:
         return _not_testable(data, passes, given, wet)
     asked = hypotheses(passes)
 
     def found_in(some: Passes) -> Found:
-        return compete(some, given, asked, level=level, surrogates=surrogates, seed=seed, say=say)
+        return compete(some, given, asked, level=o.level, surrogates=o.surrogates, seed=o.seed, say=progress)
 
     passes = doubted(passes, given)
     found = found_in(passes)
     if found.options:
         kept = steady(passes, found.options[0].refit.model)
         if kept is not passes and np.isfinite(kept.values[:, -1]).sum() >= LEAST_RUNS:
-            say("repeating without runs that float in the new model")
+            progress("repeating without runs that float in the new model")
             passes = kept
             found = found_in(passes)._replace(significance=found.significance)
-    say("gain on runs left out")
-    decision = conclude(found, passes, given, seed=seed)
-    won = None
-    if decision.best is not None:
-        won = gain(passes, decision.best.option.refit, found.nothing, found.scatter, seed=seed)
-    return _diagnosed(data, passes, found, decision, won, level)
+    progress("gain on runs left out")
+    return _diagnosed(data, passes, found, *conclude(found, passes, given, seed=o.seed), o.level)
 
 
 def _not_testable(data: CampaignData, passes: Passes, given: Model, wet: int) -> Diagnosis:
     reason = f"{wet} usable runs on water, at least {LEAST_RUNS} needed"
     return Diagnosis(
-        "not_testable", verdict_sentence("not_testable", (), level=0.0, reason=reason),
-        tuple(i.name for i in passes.infos), _driven_s(data), float(passes.seconds.sum()), (), (), None, (), (), (),
-        None, None, given, passes.names, {}, (reason, *_notes(passes)),
+        "not_testable", f"Not testable: {reason}.", tuple(i.name for i in passes.infos), _driven_s(data),
+        float(passes.seconds.sum()), given, passes.names, notes=(reason, *_notes(passes)),
     )  # fmt: skip
 
 
 def _diagnosed(
-    data: CampaignData, passes: Passes, found: Found, d: Decision[Option], won: Gain | None, level: float
+    data: CampaignData, passes: Passes, found: Found, d: Outcome[Option], won: Gain | None, level: float
 ) -> Diagnosis:
     evidence, c, p = found.evidence, found.calibration, found.significance.p_value
     after = d.best.option.refit if d.best is not None and d.verdict != "cannot_tell" else found.nothing
