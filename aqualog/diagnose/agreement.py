@@ -36,7 +36,7 @@ def agreements(found: Found, r: Refit, base: FloatArray) -> tuple[Agreement, ...
         return ()
     columns = [c for h in r.members for c in evidence.columns[evidence.asked.index(h)]]
     G, b, apart = _normal(found, r, columns)
-    keep = np.diag((PRIOR_WIDTH * _prior(r)) ** -2.0)
+    keep = np.diag([(PRIOR_WIDTH * r.members[i].parameter(n).sigma) ** -2.0 for i, n in r.names])
     alone = np.array([np.linalg.solve(g + keep, x) for g, x in zip(G, b, strict=True)])
     # the car's drive-to-drive spread is added to the variance of a single drive's value
     sd = np.array([np.sqrt(np.diag(np.linalg.inv(g + keep)) + apart**2) for g in G])
@@ -120,10 +120,6 @@ def _normal(found: Found, r: Refit, columns: Sequence[int]) -> tuple[FloatArray,
         b.append(measure.inner(J, y)[:, 0])
         apart = measure.apart[list(columns)]
     return np.array(G), np.array(b), apart
-
-
-def _prior(r: Refit) -> FloatArray:
-    return np.array([r.members[i].parameter(n).sigma for i, n in r.names])
 
 
 def _loss(G: FloatArray, b: FloatArray, delta: FloatArray) -> float:

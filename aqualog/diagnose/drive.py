@@ -25,6 +25,7 @@ from aqualog.diagnose.inputs import (
     brakes_in_torque,
     brakes_unlogged,
     confirmed_torque,
+    lasting,
     needed_torque,
     quiet_speed,
     quiet_torque,
@@ -44,6 +45,7 @@ BESIDE_S = 1.0  # [s] before and after what is left out
 BEHIND_S = 1.0  # [s] after a stretch of water, in which the rear axle and the speed still have it
 LEAST_RATE_HZ = 5.0
 GAP_S = 0.25  # [s] longer gaps are not bridged
+FROZEN_S = 5.0  # [s] longer, a signal does not stay the same
 A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
 A_X_MAX = 6.0  # [m/s^2]
 # [m/s^3] at steeper torque the samples show clocks, filters and tyre lag: 10 ms are 0.1 m/s^2
@@ -163,7 +165,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     if not judges_afloat:
         bad |= floats
     if "a_x" in filled:
-        bad |= _frozen(filled["a_x"], dt)
+        bad |= lasting(np.diff(filled["a_x"], prepend=np.nan) == 0.0, FROZEN_S, dt)
     bad |= np.abs(np.gradient(speed, dt)) > A_X_MAX
     if "yaw_rate" in filled and (cornering := np.abs(v * filled["yaw_rate"]) > A_Y_MAX).any():
         # of a simulated car, too: one that has begun to slide shows nothing of the measured one
@@ -306,17 +308,6 @@ def _lanes(columns: Mapping[str, FloatArray], dt: float) -> tuple[Lane, ...]:
         for a, b in pairwise(edges)
         if b > a and wet[a]
     )
-
-
-def _frozen(x: FloatArray, dt: float) -> BoolArray:
-    """Samples of stretches of 5 s and more in which a signal does not change at all."""
-    same = np.concatenate([[False], np.diff(x) == 0.0])
-    edge = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    out = np.zeros(x.size, dtype=bool)
-    for a, b in zip(edge[::2], edge[1::2], strict=True):
-        if (b - a) * dt > 5.0:
-            out[a:b] = True
-    return out
 
 
 def _on_water(course: Course) -> BoolArray:

@@ -60,7 +60,9 @@ def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extende
     ConfigError
         If a term leads to a value outside the limits of a vehicle file.
     """
-    base = _believed(vehicle)
+    # the simulation of the vehicle file, with perfect sensors on the buses of a series car
+    worn = TYRES["worn_summer"]
+    base = Setup(build_plant(vehicle, worn, worn), Sensors("believed", ESC.groups), Scenario(vehicle))
     terms = tuple(t for t in model.terms if not _is_neutral(t))
     setup = Model(terms).apply(base)
     own = {s: signals.array(s) for s in signals.symbols if signals.frame[s].null_count() < signals.frame.height}
@@ -78,12 +80,6 @@ def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extende
             signals, frame=signals.frame.with_columns([pl.Series(s, x, nan_to_null=True) for s, x in new.items()])
         )
     return Extended(signals, car, tuple(dict.fromkeys(notes)))
-
-
-def _believed(vehicle: Vehicle) -> Setup:
-    """The simulation of the vehicle file, with perfect sensors on the buses of a series car."""
-    worn = TYRES["worn_summer"]
-    return Setup(build_plant(vehicle, worn, worn), Sensors("believed", ESC.groups), Scenario(vehicle))
 
 
 def _is_neutral(term: Term) -> bool:
@@ -118,12 +114,9 @@ def _undo_sensors(measured: _Measured, sensors: Sensors) -> None:
     late = {name: c.delay_s for name, c in sensors.channels.items() if c.delay_s != 0.0}
     for name in {**skew, **late}.keys() & columns.keys():
         seen = (t - t[0] + late.get(name, 0.0)) * (1.0 + skew.get(name, 0.0) * 1e-6) / measured.dt
-        columns[name] = _taken(columns[name], np.rint(seen))
-
-
-def _taken(x: FloatArray, i: FloatArray) -> FloatArray:
-    inside = (i >= 0.0) & (i < x.size)
-    return np.where(inside, x[np.where(inside, i, 0.0).astype(np.intp)], np.nan)
+        at, x = np.rint(seen), columns[name]
+        inside = (at >= 0.0) & (at < x.size)
+        columns[name] = np.where(inside, x[np.where(inside, at, 0.0).astype(np.intp)], np.nan)
 
 
 def _notes(term: Term, base: Setup, measured: _Measured) -> list[str]:
@@ -190,7 +183,8 @@ def _undo_wheels(measured: _Measured, before: Plant, after: Plant) -> None:
     columns = measured.columns
     for i, w in enumerate(WHEELS):
         omega, torque = f"omega_{w}", f"torque_{w}"
-        factor = _over_axle(after.r_e, i, WHEELS.index(next(x for x in AXLES[w[0]] if x != w)))
+        other = WHEELS.index(next(x for x in AXLES[w[0]] if x != w))
+        factor = float(after.r_e[i] / (0.5 * (after.r_e[i] + after.r_e[other])))
         if factor != 1.0 and omega in columns:
             columns[omega] = factor * columns[omega]
         if grows and omega in columns and (after.radius_growth[i] != 0.0 or after.leak_radius[i] != 0.0):
@@ -199,10 +193,6 @@ def _undo_wheels(measured: _Measured, before: Plant, after: Plant) -> None:
         gain = after.torque_gain / factor
         if gain != 1.0 and torque in columns:
             columns[torque] = gain * columns[torque]
-
-
-def _over_axle(radius: FloatArray, i: int, other: int) -> float:
-    return 1.0 if radius[i] == radius[other] else float(radius[i] / (0.5 * (radius[i] + radius[other])))
 
 
 def _undo_forces(measured: _Measured, before: Plant, after: Plant) -> list[str]:

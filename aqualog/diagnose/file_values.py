@@ -60,11 +60,9 @@ def own_sd(vehicle: Vehicle, path: str) -> float:
     """
     if not vehicle.provenance and (path in vehicle.given or not path.endswith(("_f", "_r"))):
         return 0.0
-    return 0.0 if path in ("mass", "torque_gain") and _is_bound(vehicle) else uncertainty(vehicle, path)
-
-
-def _is_bound(vehicle: Vehicle) -> bool:
-    return "calibrated" in {provenance_of(vehicle, path).source for path in ("mass", "torque_gain")}
+    bound = ("mass", "torque_gain")
+    is_known = path in bound and any(provenance_of(vehicle, p).source == "calibrated" for p in bound)
+    return 0.0 if is_known else uncertainty(vehicle, path)
 
 
 def with_known(model: Model, vehicle: Vehicle) -> Model:

@@ -16,9 +16,9 @@ import numpy as np
 
 from aqualog.core.intervals import chi2_log_p
 from aqualog.core.notation import WHEELS
-from aqualog.core.records import BoolArray, FloatArray, Origin, Signals
+from aqualog.core.records import FloatArray, Origin, Signals
 from aqualog.core.units import is_unit, parse_unit
-from aqualog.diagnose.inputs import SPEED_S, smooth
+from aqualog.diagnose.inputs import SPEED_S, lasting, smooth
 
 __all__ = ["LEVEL", "ORDERS", "PerTurn", "Z", "per_turn", "wheel_columns"]
 
@@ -164,7 +164,7 @@ def _prepared(x: FloatArray, dt: float, origin: Origin | None) -> _Wheel | str:
     good = np.isfinite(x)
     if good.sum() * dt < 2.0 * SPEED_S or 0.5 * NYQUIST * rate <= LEAST_HZ:
         return f"the wheel speeds come at {rate:.3g} Hz" if good.any() else "no wheel speed"
-    missing = _long_gaps(good, dt)
+    missing = lasting(~good, GAP_S, dt)
     filled = np.interp(np.arange(x.size), np.flatnonzero(good), x[good])
     mean = smooth(filled, dt, SPEED_S)
     scatter, step = _scatter(filled - mean, dt), _step(x)
@@ -334,15 +334,6 @@ def _held(x: FloatArray) -> int:
         if np.bincount(changes % h, minlength=h).max() >= IN_STEP * changes.size:
             return h
     return 1
-
-
-def _long_gaps(good: BoolArray, dt: float) -> BoolArray:
-    """Missing samples of stretches longer than a straight line may bridge."""
-    out = np.zeros(good.size, dtype=bool)
-    edge = np.flatnonzero(np.diff(np.concatenate([[0], (~good).astype(np.int8), [0]])))
-    for a, b in zip(edge[::2], edge[1::2], strict=True):
-        out[a:b] = (b - a) * dt > GAP_S
-    return out
 
 
 def _scatter(rest: FloatArray, dt: float) -> FloatArray:

@@ -21,8 +21,8 @@ from aqualog.physics.load import G
 
 __all__ = [
     "A_MOST", "BRAKE_PRESSURE", "LEAST_S", "SPEED_S", "V_MIN", "brakes_in_torque", "brakes_unlogged",
-    "confirmed_torque", "needed_torque", "quiet", "quiet_speed", "quiet_torque", "road_wheel_angle", "roll_out",
-    "smooth",
+    "confirmed_torque", "lasting", "needed_torque", "quiet", "quiet_speed", "quiet_torque", "road_wheel_angle",
+    "roll_out", "smooth",
 ]  # fmt: skip
 
 SPEED_BAND_HZ = (2.0, 4.5)  # there a speed is noise: 0.1 m/s^2 are below 8 mm/s; beyond, slow buses are interpolated
@@ -61,6 +61,15 @@ def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
         return x
     window = np.hanning(k + 2)[1:-1]
     return np.convolve(np.pad(x, k // 2, mode="edge"), window / window.sum(), "valid")
+
+
+def lasting(bits: BoolArray, least_s: float, dt: float) -> BoolArray:
+    """Samples (n,) of stretches that are true for longer than a time [s]."""
+    out = np.zeros(bits.size, dtype=bool)
+    edge = np.flatnonzero(np.diff(np.concatenate([[0], bits.astype(np.int8), [0]])))
+    for a, b in zip(edge[::2], edge[1::2], strict=True):
+        out[a:b] = (b - a) * dt > least_s
+    return out
 
 
 def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:

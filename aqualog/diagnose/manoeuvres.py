@@ -139,9 +139,7 @@ def _lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
 
 def turned(model: Model) -> Model:
     """The model as it acts when the same road is driven the other way: wind and slope come from the other side."""
-    return Model(tuple(_turned(t) if t.effect.drive.turns else t for t in model.terms))
-
-
-def _turned(term: Term) -> Term:
-    values = {n: -v for n, v in term.values.items()}
-    return Term(term.effect, values, term.where, tuple((x, -v) for x, v in term.knots))
+    return Model(tuple(
+        Term(t.effect, {n: -v for n, v in t.values.items()}, t.where, tuple((x, -v) for x, v in t.knots))
+        if t.effect.drive.turns else t for t in model.terms
+    ))  # fmt: skip

@@ -105,7 +105,8 @@ def diagnose(
     outcome = conclude(found, model)
     chosen = outcome.best.option.refit if outcome.best else None
     outcome, agreed = _by_drive(found, outcome, chosen, model)
-    noises = _noises(evidence, chosen)
+    quiet = evidence.residuals if chosen is None else chosen.residuals
+    noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, ready, strict=True)]
     if road is not None:
         outcome = _with_road(outcome, road)
     is_named = any(c.effect == "road_grade" and "grade_rms" in c.parameters for c in outcome.causes)
@@ -183,12 +184,6 @@ def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
     return _Setting(supported(around_water(evidence, model)), model, bare, road, untested, notes)
 
 
-def _noises(evidence: Evidence, chosen: Refit | None) -> list[Noise]:
-    """Noise of each drive after the chosen set."""
-    quiet = evidence.residuals if chosen is None else chosen.residuals
-    return [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, evidence.drives, strict=True)]
-
-
 def _sentence(outcome: Outcome[Option], found: Found, options: Options, untested: Mapping[str, str]) -> str:
     reason = f" ({short_form(found.forms[0])})" if found.forms else ""
     p = found.significance.p_value
@@ -203,7 +198,8 @@ def _gained(
     noise: Noise, options: Options,
 ) -> Gain:  # fmt: skip
     """Gain of the extended model over the given one: on unseen drives if there are any, else on the diagnosed ones."""
-    elsewhere = _without_road(extended, given)  # a road is this drive's own
+    own = {id(t) for t in given.terms}  # a road is this drive's own
+    elsewhere = Model(tuple(t for t in extended.terms if id(t) in own or t.effect.name != "unexplained_grade"))
     unseen = _prepared(holdout, vehicle)[0] if holdout else []
     unseen = [d for d in unseen if d.channels == ready[0].channels]
     effects: tuple[Consequence, ...] = ()
@@ -253,11 +249,6 @@ def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
         verdict = "compound" if own else "named"
     certain = outcome.certain | {cause.effect}
     return outcome._replace(verdict=verdict, causes=(*own, cause), certain=certain)
-
-
-def _without_road(extended: Model, given: Model) -> Model:
-    own = {id(t) for t in given.terms}
-    return Model(tuple(t for t in extended.terms if id(t) in own or t.effect.name != "unexplained_grade"))
 
 
 def _unnamed(outcome: Outcome[Option], found: Found, options: Options) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 import pytest
 
 from aqualog.book.reference.model import effects_page
-from aqualog.diagnose import day_to_day
+from aqualog.diagnose import file_values
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.manoeuvres import checks
@@ -32,7 +32,7 @@ def test_a_new_row_is_searched_for_with_its_own_facts():
     asked, _ = hypotheses([prepare(plain(), CAR, "a")], Model())
     h = next(h for h in asked if h.key == "open_window")
     assert (h.free, h.tolerance("area"), h.worth_naming("area")) == (("area",), 0.004, 0.01)
-    assert day_to_day.kind_of(h, "area") == "drag"
+    assert file_values.kind_of(h, "area") == "drag"
     assert [c.name for c in checks(frozenset({"open_window", "payload_mass"}))] == ["look", "weighing"]
 
 
