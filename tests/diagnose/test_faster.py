@@ -5,16 +5,7 @@ from dataclasses import replace
 import pytest
 
 from aqualog.diagnose import arena, faster, run
-from aqualog.diagnose.faster import (
-    Faster,
-    joined,
-    limits,
-    pooled,
-    to_causes,
-    why_untested,
-    with_rings,
-    without_known,
-)
+from aqualog.diagnose.faster import Faster, joined, pooled, to_causes, why_untested, with_rings, without_known
 from aqualog.diagnose.full_rate import PerTurn
 from aqualog.diagnose.records import Cause
 from aqualog.diagnose.seams import Seam
@@ -102,13 +93,14 @@ def test_what_sound_wheels_show_is_no_name():
 
 def test_limits_are_named_with_a_power_of_nine_in_ten():
     """At the limit, the amplitude that is found is smaller by 1.28 of its deviations in one of ten drives."""
-    by_place = {x.where: x.size for x in limits([ring(w, half=6e-4) for w in ("fl", "fr")] + [ring("rl", p=0.5)])}
+    by_place = {
+        x.where: x.size for x in faster.limits([ring(w, half=6e-4) for w in ("fl", "fr")] + [ring("rl", p=0.5)])
+    }
     assert set(by_place) == {"fl", "fr", "rl", "f", "left"}
     assert 2e-3 < by_place["rl"] < by_place["f"] < by_place["fl"] == by_place["fr"]
-    sd = 6e-4 / 1.96
-    (cause,) = to_causes([ring(amplitude=by_place["fl"] - 1.28 * sd, half=6e-4)])
+    (cause,) = to_causes([ring(amplitude=by_place["fl"] - 1.28 * 6e-4 / 1.96, half=6e-4)])
     assert cause.probability == pytest.approx(0.95, abs=0.01)
-    assert limits([ring(kind="untested")]) == ()
+    assert faster.limits([ring(kind="untested")]) == ()
 
 
 def test_drives_together():

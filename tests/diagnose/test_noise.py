@@ -136,9 +136,3 @@ def test_what_came_before_the_log_is_its_first_second():
     noise = fit_noise(coloured(10, 1000)[:1], np.ones(1000, dtype=bool), np.eye(1))
     z = whitened(x, for_mask(noise, np.ones(500, dtype=bool)))[0]
     np.testing.assert_allclose(z[:MEMORY], z[-1], rtol=1e-6)
-
-
-def bands(x, y):
-    """Cross spectrum in five bands."""
-    f = np.fft.rfft(x - x.mean()) * np.conj(np.fft.rfft(y - y.mean()))
-    return np.array([b.real.sum() for b in np.array_split(f[1:], [30, 150, 600, 1500])])

@@ -145,8 +145,7 @@ def test_no_name_for_what_laws_of_water_differ_by(gains, is_found):
     """Sources differ by a factor of two in the lost contact and in the drag; no file says which law a tyre has."""
     hidden = (term("contact_loss", gain=gains[0]), term("water_drag", gain=gains[1]))
     arena = known_only(arena_of(around_water(on_water(*hidden, lanes=SHALLOW), Model()), ()), [])
-    posterior = compete(arena)
-    found = {arena.blocks[m].key.split("@")[0] for m in posterior.best}
+    found = {arena.blocks[m].key.split("@")[0] for m in compete(arena).best}
     assert ("contact_loss" in found) is is_found
     assert is_found or not found
 
@@ -157,8 +156,8 @@ def test_a_law_that_is_fitted_to_the_car_is_driven_and_leaves_less_room():
     own, usual = ({h.key: h for h in asked_of(x)}["contact_loss@f"] for x in (d, prepare(wet(), CAR, "a")))
     assert own.tolerance("gain") == pytest.approx(0.3 * usual.tolerance("gain"))
     assert own.worth_naming("gain") < usual.worth_naming("gain")
-    own, usual = (follow(car, d.course, Model())["omega_fl"] for car in (known, CAR))
-    assert np.abs(own - usual).max() > 0.05
+    driven = [follow(car, d.course, Model())["omega_fl"] for car in (known, CAR)]
+    assert np.ptp(driven, axis=0).max() > 0.05
 
 
 def test_one_effect_of_water_more_has_only_its_own_evidence():

@@ -170,10 +170,8 @@ def forecasts(cases: Sequence[Judged]) -> list[Measure]:
 
     It is stated for effects that are large enough to be found, so what is below the limit does not count.
     """
-    told = [
-        c for c in _singles(cases, STRONG)
-        if math.isfinite(c.row.truth[0].p_right) and not c.row.error and not c.limit_is_right
-    ]  # fmt: skip
+    large = [c for c in _singles(cases, STRONG) if not c.row.error and not c.limit_is_right]
+    told = [c for c in large if math.isfinite(c.row.truth[0].p_right)]
     pairs = [(c.row.truth[0].p_right, c.first_is_right) for c in told]
     return [
         _skill(6, "isolability forecast, Brier skill", pairs, 50),
