@@ -166,10 +166,7 @@ def coverage(cases: Sequence[Judged]) -> list[Measure]:
 
 
 def forecasts(cases: Sequence[Judged]) -> list[Measure]:
-    """Metric 6: the chance to tell an effect from its nearest rival, as stated, beside whether it was named.
-
-    It is stated for effects that are large enough to be found, so what is below the limit does not count.
-    """
+    """Metric 6: the chance to tell an effect from its nearest rival, as stated for what is above the limit, beside its name."""
     large = [c for c in _singles(cases, STRONG) if not c.row.error and not c.limit_is_right]
     told = [c for c in large if math.isfinite(c.row.truth[0].p_right)]
     pairs = [(c.row.truth[0].p_right, c.first_is_right) for c in told]
