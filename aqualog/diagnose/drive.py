@@ -47,7 +47,7 @@ LEAST_RATE_HZ = 5.0
 GAP_S = 0.25  # [s] longer gaps are not bridged
 FROZEN_S = 5.0  # [s] longer, a signal does not stay the same
 A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
-SLIDES = 6.0  # [m/s^2] of a simulated car that is measured below `A_Y_MAX`: its tyres are at the end of their grip (K)
+OTHERWISE = 2.0  # [m/s^2] by which a simulated car corners otherwise that has too little grip: else 0.2 (D)
 A_X_MAX = 6.0  # [m/s^2]
 # [m/s^3] at steeper torque the samples show clocks, filters and tyre lag: 10 ms are 0.1 m/s^2
 JERK_MAX, JERK_S = 10.0, 0.1
@@ -169,9 +169,10 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         bad |= lasting(np.diff(filled["a_x"], prepend=np.nan) == 0.0, FROZEN_S, dt)
     bad |= np.abs(np.gradient(speed, dt)) > A_X_MAX
     if "yaw_rate" in filled and (cornering := np.abs(v * filled["yaw_rate"]) > A_Y_MAX).any():
-        # a simulated car that has begun to slide shows nothing of the measured one
+        # a simulated car that slides shows nothing of the measured one
         led = follow(vehicle, course, Model())
-        bad |= cornering | (np.abs(led["v_x"] * led["yaw_rate"]) > SLIDES)
+        slides = np.abs(led["v_x"] * led["yaw_rate"]) > A_Y_MAX
+        bad |= cornering | (slides & (np.abs(led["v_x"] * (led["yaw_rate"] - filled["yaw_rate"])) > OTHERWISE))
     # friction brakes are at every wheel: the torque of one axle cannot hold them
     every_wheel = torqued and all(f"torque_{w}" in filled for w in WHEELS)
     if "brake_pressure" in filled and not (every_wheel and brakes_in_torque(filled["brake_pressure"], torque)):

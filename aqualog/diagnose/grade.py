@@ -39,7 +39,8 @@ LEAST_ALONE = 0.02  # rms without torque and on one pass: 20 mg are an accelerom
 LEAST_BINS = 40
 STANDS_OUT = 4.0  # standard deviations of a correlation by chance
 SMOOTHED = 0.03  # share of the rms that smoothing may remove or noise may add
-LAP_LEAST_M, LAP_SIGMAS, LAP_CORRELATION = 500.0, 4.5, 0.7
+# of the some 50 lags of a drive that differ, one is beyond 4 standard deviations by chance in one of 300 drives
+LAP_LEAST_M, LAP_SIGMAS, LAP_CORRELATION = 500.0, 4.0, 0.7
 ALIKE_M = 2000.0  # [m] over which the road's autocorrelation counts
 GOES_WITH_ACCELERATION = slice(3, None)  # of the shapes of `_motion`
 CLIPPED = 5.0  # robust standard deviations
