@@ -61,7 +61,7 @@ BEYOND_GRIP = 0.05
 # full aquaplaning, which sources give as 118 (thesis), 95 (PAVDRN, K) and 88 km/h (Gallaway, K) at 1.3 mm
 RESERVE = 2.0
 # [s] a wheel that stood takes up speed again within one (D: 33 m/s in 0.65 s), but the led car has been turned by it,
-# nobody steers it back, and its yaw dies out in a few
+# and its yaw dies out in a few
 RECOVERY_S = 5.0
 RESERVED = (Model(), Model((Term(EFFECTS["contact_loss"], {"gain": RESERVE}),)))
 V_LEAST = 4.0  # [m/s] under the slip

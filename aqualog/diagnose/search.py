@@ -254,7 +254,7 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     near = linear[best] - max(NEAR, 2.0 * STRUCTURE * linear[best])
     chosen += [m for m, e in posterior.sets if len(m) == 1 < len(best) and e > near]
     # of each effect its nearest rival, too, rather a small set: sets that differ in small members may come first
-    for name in {arena.name(b) for b in best}:
+    for name in dict.fromkeys(arena.name(b) for b in best):
         others = [(e - 2.0 * STRUCTURE * linear[best] * len(m), m) for m, e in posterior.sets if m and e > near]
         chosen += [m for _, m in sorted(others, reverse=True) if all(arena.name(b) != name for b in m)][:1]
     chosen = [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m]
