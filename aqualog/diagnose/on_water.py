@@ -21,7 +21,7 @@ from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
 from aqualog.diagnose.spectrum import weighing
 from aqualog.diagnose.threads import beside
-from aqualog.model.term import Model
+from aqualog.model.term import Model, Term
 
 __all__ = ["around_water", "of_water"]
 
@@ -42,15 +42,16 @@ class _Tried(NamedTuple):
     residuals: tuple[FloatArray, ...]
 
 
-def around_water(evidence: Evidence, model: Model) -> Evidence:
-    """The evidence with signatures of water around its most likely single effect; the same evidence on dry drives.
+def around_water(evidence: Evidence, model: Model) -> tuple[Evidence, Term | None]:
+    """The evidence with signatures of water around its most likely single effect, and that; the same evidence and none
+    on dry drives.
 
     What is most likely is decided with the noise estimated anew under each, since an effect that is left in the
     residual looks like noise. Residuals are those that a linear model around this point would have had at the start.
     """
     every = of_water(evidence)
     if not every:
-        return evidence
+        return evidence, None
 
     def tried(at: tuple[int, float]) -> _Tried | None:
         i, off = at
@@ -69,10 +70,12 @@ def around_water(evidence: Evidence, model: Model) -> Evidence:
     usual = {i: evidence.prior[evidence.columns[i][0]] for i in every}
     best = best_of([(i, float(k * usual[i])) for i in every for k in SIZES])
     if best.surprise > start.surprise - CLEARLY:
-        return evidence
+        return evidence, None
     i = best.hypothesis
     best = best_of([(i, best.off + float(k * usual[i])) for k in (-FINER, FINER)])
-    return _around(evidence, model, best)
+    h = evidence.asked[i]
+    name = h.free[0]
+    return _around(evidence, model, best), Term(h.effect, {name: value_in(model, h, name) + best.off}, h.where)
 
 
 def _moved(evidence: Evidence, model: Model, h: Hypothesis, off: float) -> Model:

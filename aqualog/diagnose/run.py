@@ -48,6 +48,7 @@ LEAST_USED_S = 20.0
 LEAST_CORRELATION = 0.5
 LEAST_GAIN, MOST_GAIN = 0.5, 1.5  # bounds of an accelerometer's gain
 LEAST_MOTION = 0.1  # [m/s^2] sd of the change of the acceleration
+_WET = "Laws of water differ by that much; `aqualog calibrate --wet` fits one to the car's own passes."
 SAME = 0.2  # of what a signal changes by from sample to sample, a difference that is rounding
 # of twice the log-likelihood that an effect must gain to be more likely than none: its prior, and what its freedom
 # costs in the competition (2.5 nats (natural logarithm), typical of 300 s)
@@ -181,7 +182,10 @@ def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
         model, bare = moved, Model((*bare.terms, *new))
         ready = [led_by(d, model) for d in ready]
         evidence = simulated(ready, asked, model, tell)
-    return _Setting(supported(around_water(evidence, model)), model, bare, road, untested, notes)
+    evidence, water = around_water(evidence, model)
+    if water is not None and water.effect.belongs == "tyre" and not ready[0].vehicle.water:
+        notes += (f"On water the drive is likeliest with {term_words(water)}. {_WET}",)
+    return _Setting(supported(evidence), model, bare, road, untested, notes)
 
 
 def _sentence(outcome: Outcome[Option], found: Found, options: Options, untested: Mapping[str, str]) -> str:

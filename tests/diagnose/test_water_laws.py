@@ -99,7 +99,7 @@ def test_lanes_differ_in_full_however_well_a_file_is_known():
 def test_a_lost_contact_is_sought_near_its_size(gain):
     """A straight line from the file's contact misses it; one from about its own size does so by less than half."""
     far = on_water(term("contact_loss", gain=gain), lanes=SHALLOW)
-    near = around_water(far, Model())
+    near, likeliest = around_water(far, Model())
     mask = far.drives[0].mask
 
     def value(b):
@@ -108,13 +108,14 @@ def test_a_lost_contact_is_sought_near_its_size(gain):
         s = b.signatures[0][column(b, "contact_loss")][slips][:, mask].ravel()
         return 1.0 + float(s @ x) / float(s @ s)
 
+    assert likeliest.effect.name == "contact_loss"
     assert abs(value(far) - gain) > 0.15
     assert abs(value(near) - gain) < 0.5 * abs(value(far) - gain)
 
 
 def test_axles_differ_by_as_much_wherever_signatures_stand():
     b = on_water(term("water_drag", gain=2.2), lanes=SHALLOW)
-    near = around_water(b, Model())
+    near, _ = around_water(b, Model())
     assert not np.array_equal(near.residuals[0], b.residuals[0])
     for key in ("water_drag@f", "water_drag"):  # in the balance of forces drag is a straight line
         s, t = (x.signatures[0][column(b, key)][0, b.drives[0].mask] for x in (b, near))
@@ -136,7 +137,7 @@ def test_where_the_most_likely_water_lets_a_wheel_float_nothing_is_judged():
 def test_a_drive_without_water_stays_as_it_is():
     d = prepare(signals(sensors=NOISY), CAR, "a")
     b = simulated([d], [h for h in hypotheses([d], Model())[0] if h.key == "aero_drag"], Model(), quiet)
-    assert around_water(b, Model()) is b
+    assert around_water(b, Model()) == (b, None)
     assert supported(b) is b
 
 
@@ -144,7 +145,7 @@ def test_a_drive_without_water_stays_as_it_is():
 def test_no_name_for_what_laws_of_water_differ_by(gains, is_found):
     """Sources differ by a factor of two in the lost contact and in the drag; no file says which law a tyre has."""
     hidden = (term("contact_loss", gain=gains[0]), term("water_drag", gain=gains[1]))
-    arena = known_only(arena_of(around_water(on_water(*hidden, lanes=SHALLOW), Model()), ()), [])
+    arena = known_only(arena_of(around_water(on_water(*hidden, lanes=SHALLOW), Model())[0], ()), [])
     found = {arena.blocks[m].key.split("@")[0] for m in compete(arena).best}
     assert ("contact_loss" in found) is is_found
     assert is_found or not found
