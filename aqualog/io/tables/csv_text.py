@@ -37,12 +37,7 @@ _CACHED = 1 << 18
 
 
 class TextFile:
-    """Bytes of a file: length, slices, `find` and `count`, as of a `bytes` object.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Bytes of a file: length, slices, `find` and `count`, as of a `bytes` object."""
 
     def __init__(self, path: Path) -> None:
         self._handle = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
