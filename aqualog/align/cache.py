@@ -73,13 +73,8 @@ class Kept(NamedTuple):
 class SignalCache:
     """A folder of signals. It is created with the first entry, for the user alone.
 
-    Parameters
-    ----------
-    folder : Path
-    limit : int
-        Largest size of all drives together [bytes]; the entry with the oldest request is removed first.
-    tell : callable
-        Called with the reason why something was not kept.
+    `limit` [bytes] is the largest size of all drives together; the entry with the oldest request is removed first.
+    `tell` is called with the reason why something was not kept.
     """
 
     def __init__(self, folder: Path, *, limit: int, tell: Callable[[str], None] = lambda _: None) -> None:

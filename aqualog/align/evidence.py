@@ -104,16 +104,9 @@ class Known(NamedTuple):
 def speed_unit(
     raw: FloatArray, *, is_wheel: bool, known: Known | None, accelerometer: tuple[FloatArray, str] | None
 ) -> UnitGuess | None:
-    """Guess the unit of a speed.
+    """Guess the unit of a speed by its values (n,) on the grid.
 
-    Parameters
-    ----------
-    raw : array, shape (n,)
-        Its values on the grid.
-    is_wheel : bool
-    known : Known, optional
-    accelerometer : (array, str), optional
-        Values (n,) and unit (empty if not known) of an accelerometer along x.
+    `accelerometer`: values (n,) and unit (empty if not known) of one along x.
     """
     choices = CHOICES["wheel" if is_wheel else "speed"]
     if known is not None:

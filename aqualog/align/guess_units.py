@@ -123,12 +123,8 @@ def by_range(x: FloatArray, choices: Sequence[Choice]) -> UnitGuess | None:
 def by_acceleration(ratio: float, speeds: Sequence[Choice], accelerations: Sequence[Choice]) -> UnitGuess | None:
     """Return the unit of a speed by an accelerometer: the pair of units in which one is the derivative of the other.
 
-    Parameters
-    ----------
-    ratio : float
-        Scatter of the accelerometer's values over that of the derivative of the speed's [1/s], both raw.
-    speeds, accelerations : sequence of Choice
-        Units that the ranges allow; one acceleration if the unit is known.
+    `ratio` is the scatter of the accelerometer's values over that of the derivative of the speed's [1/s], both raw. The
+    choices are the units that the ranges allow; one acceleration if the unit is known.
     """
     if not (math.isfinite(ratio) and ratio > 0.0):
         return None

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.align.freezes import Stretch
+from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = ["LineWatch", "joined_note", "line_watch_of"]
@@ -72,38 +73,23 @@ class LineWatch:
         if self._first_ns is None:
             self._first_ns = int(t_ns[0])
         t, x = np.concatenate([self._t, t_ns]), np.concatenate([self._x, x])
-        number = (t - self._first_ns) // _BLOCK_NS
-        whole = int(np.searchsorted(number, number[-1], side="left"))
+        start = _starts(t, self._first_ns)
+        whole = int(start[-1])
         self._t, self._x = t[whole:].copy(), x[whole:].copy()
         if whole:
-            self._add(t[: whole + 1], x[: whole + 1], number[:whole])
+            self._add(t[: whole + 1], x[: whole + 1], start)
 
-    def _add(self, t: TimeArray, x: FloatArray, number: TimeArray) -> None:
-        """Take whole blocks of samples (n,), with the one sample behind them if there is one."""
-        start = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
-        end = np.append(start[1:], number.size)
-        after = np.minimum(end, t.size - 1)
-        after = np.where(t[after] - t[end - 1] > _BLOCK_NS, end - 1, after)
-        of = np.repeat(np.arange(start.size), end - start)
-        own_t, own_x = t[: number.size], x[: number.size]
-        span = np.maximum(t[after] - t[start], 1)
-        line = x[start][of] + (x[after] - x[start])[of] * ((own_t - t[start][of]) / span[of])
-        steps = np.diff(x)
-        self._finest = min(self._finest, float(np.abs(steps[steps != 0.0]).min(initial=np.inf)))
-        steps = np.concatenate([[0.0], steps])[: number.size]
-        is_first = np.zeros(number.size, dtype=np.bool_)
-        is_first[start] = True
-        turns = (np.concatenate([[0.0], steps[:-1]]) * steps < 0.0) & ~is_first & ~np.roll(is_first, 1)
-        self._kept.append(_Block(
-            t[start], x[start], t[after], x[after], np.maximum.reduceat(np.abs(own_x - line), start), end - start,
-            np.add.reduceat(((steps != 0.0) & ~is_first).astype(np.int64), start),
-            np.add.reduceat(turns.astype(np.int64), start),
-        ))  # fmt: skip
+    def _add(self, t: TimeArray, x: FloatArray, edges: TimeArray) -> None:
+        """Take the blocks between edges (b + 1,) of samples, with the one sample behind them if there is one."""
+        start = edges[:-1]
+        after, off, changes, turns, finest = _measured(t, x, edges)
+        self._finest = min(self._finest, finest)
+        self._kept.append(_Block(t[start], x[start], t[after], x[after], off, np.diff(edges), changes, turns))
 
     def finish(self) -> tuple[Stretch, ...]:
         """List the stretches that are lines, in order: the last sample before, and the first behind."""
         if self._t.size:
-            self._add(self._t, self._x, np.zeros(self._t.size, dtype=np.int64))
+            self._add(self._t, self._x, np.array([0, self._t.size]))
             self._t, self._x = self._t[:0], self._x[:0]
         if not self._kept or not np.isfinite(self._finest):
             return ()
@@ -130,6 +116,42 @@ class LineWatch:
         if int(b.turns[noisy].sum()) < _TURNS * int(b.changes[noisy].sum()):
             return ()
         return tuple((int(b.t_ns[i]), int(b.after_ns[k])) for i, k in found)
+
+
+@compiled
+def _starts(t, first_ns):  # type: ignore[no-untyped-def]
+    """Return where the blocks begin that have samples."""
+    start, edge = [0], first_ns + ((t[0] - first_ns) // _BLOCK_NS + 1) * _BLOCK_NS
+    for k in range(t.size):
+        if t[k] >= edge:
+            start.append(k)
+            edge += ((t[k] - edge) // _BLOCK_NS + 1) * _BLOCK_NS
+    return np.array(start)
+
+
+@compiled
+def _measured(t, x, edges):  # type: ignore[no-untyped-def]
+    """Per block what `_Block` keeps: last sample or first behind, distance, counts; and the smallest step. (b,)"""
+    blocks = edges.size - 1
+    after, off = np.empty(blocks, dtype=np.int64), np.zeros(blocks)
+    changes, turns, finest = np.zeros(blocks, dtype=np.int64), np.zeros(blocks, dtype=np.int64), np.inf
+    for k in range(1, x.size):
+        if x[k] != x[k - 1]:
+            finest = min(finest, abs(x[k] - x[k - 1]))
+    for b in range(blocks):
+        i, end = edges[b], edges[b + 1]
+        j = min(end, t.size - 1)
+        if t[j] - t[end - 1] > _BLOCK_NS:
+            j = end - 1
+        after[b] = j
+        span, rise = max(t[j] - t[i], 1), x[j] - x[i]
+        far, n_changes, n_turns = 0.0, 0, 0
+        for k in range(i, end):
+            far = max(far, abs(x[k] - (x[i] + rise * ((t[k] - t[i]) / span))))
+            n_changes += k > i and x[k] != x[k - 1]
+            n_turns += k > i + 1 and (x[k - 1] - x[k - 2]) * (x[k] - x[k - 1]) < 0.0
+        off[b], changes[b], turns[b] = far, n_changes, n_turns
+    return after, off, changes, turns, finest
 
 
 def _runs(b: _Block, is_line: BoolArray, off: FloatArray) -> list[tuple[int, int]]:

@@ -41,13 +41,7 @@ _MOST_AGAIN = 20_000  # samples that are looked at
 
 
 class OfLast(Generic[_Value]):
-    """A function of an array that is called repeatedly with the same object; the last answer is kept.
-
-    Parameters
-    ----------
-    function : callable
-        Function of one array, which must not change in between.
-    """
+    """A function of one array that is called repeatedly with the same, unchanged object; the last answer is kept."""
 
     def __init__(self, function: Callable[[NDArray[Any]], _Value]) -> None:
         self._function = function

@@ -12,7 +12,7 @@ from aqualog.core.compiled import compiled
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "APART", "Design", "Index", "Moments", "Noise", "block_moments", "block_starts", "moments_of", "run_numbers",
+    "APART", "Design", "Index", "Moments", "Noise", "block_moments", "block_starts", "moments_of", "residuals",
     "second_difference",
 ]  # fmt: skip
 
@@ -48,7 +48,7 @@ class Noise(NamedTuple):
 
 def block_starts(label: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return where the samples of each block begin; labels (n,) ascend."""
-    return np.flatnonzero(np.diff(label, prepend=label[0] - 1))
+    return np.append(0, 1 + np.flatnonzero(label[1:] != label[:-1]))
 
 
 def block_moments(
@@ -101,14 +101,15 @@ class Moments(NamedTuple):
     weight: FloatArray  # (g,)
 
 
-def moments_of(d: Design, first: Index, weight: FloatArray) -> Moments:
-    """Moments of each run; those of the noise per unit of weight, times the run's weight."""
+def moments_of(d: Design, first: Index, weight: FloatArray | None = None) -> Moments:
+    """Moments of each run, weights 1 by default; those of the noise per unit of weight, times the run's weight."""
     p = len(d.columns)
     h, c = block_moments(d.columns, d.y, first, weight=weight)
-    total = np.add.reduceat(weight, first)
+    ends = np.append(first, d.y.size)
+    total = np.diff(ends).astype(np.float64) if weight is None else np.add.reduceat(weight, first)
     h_noise, c_noise = np.zeros_like(h), np.zeros_like(c)
     for i in (i for i in range(p) if d.noisy[i]):
-        both, same, triples = _second_differences(d.columns[i], d.y, d.step, np.append(first, d.y.size))
+        both, same, triples = _second_differences(d.columns[i], d.y, d.step, ends)
         enough = triples >= LEAST_TRIPLES
         if triples.sum() >= LEAST_TRIPLES:
             count = np.where(enough, triples, 1)
@@ -117,9 +118,17 @@ def moments_of(d: Design, first: Index, weight: FloatArray) -> Moments:
     return Moments(h, c, h_noise, c_noise, total)
 
 
-def run_numbers(d: Design, first: Index) -> Index:
-    """Return which of the runs each sample is of, from 0. (n,)"""
-    return np.repeat(np.arange(first.size), np.diff(np.append(first, d.y.size)))
+@compiled
+def residuals(columns, y, first, lines):  # type: ignore[no-untyped-def]
+    """What the coefficients of each run, `lines` (g, p), leave of y (n,)."""
+    e = np.zeros(y.size)
+    for r in range(first.size):
+        end = first[r + 1] if r + 1 < first.size else y.size
+        for i in range(columns.shape[0]):
+            b = lines[r, i]
+            for k in range(first[r], end):
+                e[k] += columns[i, k] * b
+    return y - e
 
 
 @compiled
@@ -128,11 +137,14 @@ def _second_differences(x, y, step, ends):  # type: ignore[no-untyped-def]
     g = ends.size - 1
     both, same, triples = np.zeros(g), np.zeros(g), np.zeros(g)
     for r in range(g):
-        for k in range(ends[r], ends[r + 1] - 2 * APART):
-            if step[k + 2 * APART] - step[k] == 2 * APART and step[k + APART] - step[k] == APART:
+        begin, end = ends[r], ends[r + 1]
+        is_even = step[end - 1] - step[begin] == end - 1 - begin
+        product, square, count = 0.0, 0.0, 0
+        for k in range(begin, end - 2 * APART):
+            if is_even or (step[k + 2 * APART] - step[k] == 2 * APART and step[k + APART] - step[k] == APART):
                 d_x = x[k + 2 * APART] - 2.0 * x[k + APART] + x[k]
-                d_y = y[k + 2 * APART] - 2.0 * y[k + APART] + y[k]
-                both[r] += d_x * d_y
-                same[r] += d_x * d_x
-                triples[r] += 1.0
+                product += d_x * (y[k + 2 * APART] - 2.0 * y[k + APART] + y[k])
+                square += d_x * d_x
+                count += 1
+        both[r], same[r], triples[r] = product, square, count
     return both, same, triples

@@ -25,7 +25,7 @@ from aqualog.core.moments import (
     block_moments,
     block_starts,
     moments_of,
-    run_numbers,
+    residuals,
 )
 from aqualog.core.records import FloatArray
 
@@ -79,7 +79,7 @@ def _about_own_mean(d: Design, m: Moments, w: _Working) -> Moments:
     offset absorbs the share n T / (sigma^2 + n T) of it, with intercepts that scatter by T. Without this, k would be 3
     % too large in runs of 30 samples where noise is a third of the variation.
     """
-    is_one = np.ptp(d.columns, axis=1) == 0.0
+    is_one = (d.columns == d.columns[:, :1]).all(axis=1)
     if not is_one.any():
         return m
     own = m.weight * float(w.between[is_one].max())
@@ -87,13 +87,11 @@ def _about_own_mean(d: Design, m: Moments, w: _Working) -> Moments:
     return m._replace(h_noise=m.h_noise * keeps[:, None, None], c_noise=m.c_noise * keeps[:, None])
 
 
-def _working_model(d: Design, first: Index, m: Moments, weight: FloatArray) -> _Working:
+def _working_model(d: Design, first: Index, m: Moments, weight: FloatArray | None = None) -> _Working:
     """Variances within and between the runs."""
     own = np.einsum("gij,gj->gi", np.linalg.pinv(m.h, rcond=1e-8, hermitian=True), m.c)
-    run = run_numbers(d, first)
-    e = d.y - np.einsum("ig,gi->g", d.columns, own[run]) if d.y.size else d.y
-    e = e * np.sqrt(weight)
-    memory = _memory(e, run, d.step)
+    e = residuals(d.columns, d.y, first, own) * (1.0 if weight is None else np.sqrt(weight))
+    memory = _memory(e, d.run, d.step)
     free = np.maximum(m.weight - len(d.columns) * memory, 0.2 * m.weight)
     variance = max(float(e @ e) / float(free.sum()), 1e-30) * memory
     between = _between(m, variance, np.array(d.scatters)) if first.size > 1 else np.zeros(len(d.columns))
@@ -141,88 +139,76 @@ def _between(m: Moments, variance: float, scatters: NDArray[np.bool_]) -> FloatA
 
 def _unlikelihood(m: Moments, variance: float, grid: FloatArray) -> FloatArray:
     """-2 log of the restricted likelihood, without a constant, for each row of `grid` (q, p)."""
-    k, a, b, spread = _weighed(variance, m.h, m.c, grid)
-    value = np.einsum("qij,qj->qi", np.linalg.pinv(a, rcond=1e-10, hermitian=False), b)
-    # residual sum of squares without y'y, which is the same for all
-    rss = -2.0 * value @ m.c.sum(axis=0) + np.einsum("qi,ij,qj->q", value, m.h.sum(axis=0), value)
-    explained = _explained(k, m.h, m.c, grid, value)
-    result: FloatArray = spread + np.linalg.slogdet(a)[1] + (rss - explained) / variance
+    a, b, scattered, spread = (_weighed_lines if m.c.shape[1] == 2 else _weighed)(variance, m.h, m.c, grid)
+    try:
+        value = np.linalg.solve(a, b[:, :, None])[:, :, 0]
+    except np.linalg.LinAlgError:  # columns depend on each other
+        value = np.einsum("qij,qj->qi", np.linalg.pinv(a, rcond=1e-10), b)
+    # what the lines leave, over the variance, without y'y, which is the same for all: H T K = I - sigma^2 K
+    left = -np.einsum("qi,qi->q", value, b) - scattered / variance
+    result: FloatArray = spread + np.linalg.slogdet(a)[1] + left
     return result
 
 
 @compiled
-def _inverse(x, out):  # type: ignore[no-untyped-def]
-    """|det x| of a small matrix (p, p), which is used up; its inverse into `out`. Gauss and Jordan with pivots."""
-    p = x.shape[0]
-    if p == 2:  # nearly always: a slope and an offset
-        determinant = x[0, 0] * x[1, 1] - x[0, 1] * x[1, 0]
-        out[0, 0], out[0, 1] = x[1, 1] / determinant, -x[0, 1] / determinant
-        out[1, 0], out[1, 1] = -x[1, 0] / determinant, x[0, 0] / determinant
-        return abs(determinant)
-    for i in range(p):
-        for j in range(p):
-            out[i, j] = 1.0 if i == j else 0.0
-    determinant = 1.0
-    for i in range(p):
-        best = i
-        for r in range(i + 1, p):
-            if abs(x[r, i]) > abs(x[best, i]):
-                best = r
-        for j in range(p):
-            x[i, j], x[best, j] = x[best, j], x[i, j]
-            out[i, j], out[best, j] = out[best, j], out[i, j]
-        pivot = x[i, i]
-        determinant *= abs(pivot)
-        for j in range(p):
-            x[i, j] /= pivot
-            out[i, j] /= pivot
-        for r in range(p):
-            if r != i:
-                factor = x[r, i]
-                for j in range(p):
-                    x[r, j] -= factor * x[i, j]
-                    out[r, j] -= factor * out[i, j]
-    return determinant
-
-
-@compiled
 def _weighed(variance, h, c, grid):  # type: ignore[no-untyped-def]
-    """For each row T of `grid`: K = (sigma^2 I + H T)^-1 of the runs (q, g, p, p), sums of K H and of K c over them,
-    and the sum of log |I + H T / sigma^2|.
+    """For each row T of `grid`, with K = (sigma^2 I + H T)^-1: sums over the runs of K H (q, p, p), K c (q, p),
+    c' T K c (q,) and log |I + H T / sigma^2| (q,). Gauss and Jordan need no pivots: H is positive, T diagonal.
     """
     q, (g, p) = grid.shape[0], c.shape
-    k, a, b, spread = np.empty((q, g, p, p)), np.zeros((q, p, p)), np.zeros((q, p)), np.zeros(q)
-    inner = np.empty((p, p))
+    a, b, scattered, spread = np.zeros((q, p, p)), np.zeros((q, p)), np.zeros(q), np.zeros(q)
+    x = np.empty((p, 2 * p + 1))  # sigma^2 I + H T, H, c
     for n in range(q):
         for r in range(g):
             for i in range(p):
                 for j in range(p):
-                    inner[i, j] = (variance if i == j else 0.0) + h[r, i, j] * grid[n, j]
-            own = k[n, r]
-            spread[n] += math.log(_inverse(inner, own) / variance**p)
+                    x[i, j], x[i, p + j] = (variance if i == j else 0.0) + h[r, i, j] * grid[n, j], h[r, i, j]
+                x[i, 2 * p] = c[r, i]
+            determinant = 1.0
             for i in range(p):
+                pivot = x[i, i]
+                determinant *= abs(pivot) / variance
+                for j in range(i + 1, 2 * p + 1):
+                    x[i, j] /= pivot
+                    for k in range(p):
+                        if k != i:
+                            x[k, j] -= x[k, i] * x[i, j]
+            spread[n] += math.log(determinant)
+            for i in range(p):
+                b[n, i] += x[i, 2 * p]
+                scattered[n] += c[r, i] * grid[n, i] * x[i, 2 * p]
                 for j in range(p):
-                    b[n, i] += own[i, j] * c[r, j]
-                    for other in range(p):
-                        a[n, i, other] += own[i, j] * h[r, j, other]
-    return k, a, b, spread
+                    a[n, i, j] += x[i, p + j]
+    return a, b, scattered, spread
 
 
 @compiled
-def _explained(k, h, c, grid, value):  # type: ignore[no-untyped-def]
-    """Sum over the runs of s' T K s with s = c - H value, for each row of `grid`. (q,)"""
-    q, (g, p) = grid.shape[0], c.shape
-    out, s = np.zeros(q), np.empty(p)
+def _weighed_lines(variance, h, c, grid):  # type: ignore[no-untyped-def]
+    """The same with two columns, nearly always a slope and an offset: all in registers, and few logarithms."""
+    q, g = grid.shape[0], c.shape[0]
+    a, b, scattered, spread = np.empty((q, 2, 2)), np.empty((q, 2)), np.empty(q), np.empty(q)
     for n in range(q):
+        t_0, t_1 = grid[n, 0], grid[n, 1]
+        a_00 = a_01 = a_11 = b_0 = b_1 = form = logs = 0.0
+        product = 1.0
         for r in range(g):
-            for i in range(p):
-                s[i] = c[r, i]
-                for j in range(p):
-                    s[i] -= h[r, i, j] * value[n, j]
-            for i in range(p):
-                for j in range(p):
-                    out[n] += s[i] * grid[n, i] * k[n, r, i, j] * s[j]
-    return out
+            h_00, h_01, h_11 = h[r, 0, 0], h[r, 0, 1], h[r, 1, 1]
+            d_0, d_1 = variance + h_00 * t_0, variance + h_11 * t_1
+            determinant = d_0 * d_1 - h_01 * h_01 * t_0 * t_1
+            over = 1.0 / determinant
+            x_0 = (d_1 * c[r, 0] - h_01 * t_1 * c[r, 1]) * over
+            x_1 = (d_0 * c[r, 1] - h_01 * t_0 * c[r, 0]) * over
+            b_0, b_1 = b_0 + x_0, b_1 + x_1
+            form += c[r, 0] * t_0 * x_0 + c[r, 1] * t_1 * x_1
+            a_00 += (d_1 * h_00 - h_01 * t_1 * h_01) * over
+            a_01 += variance * h_01 * over
+            a_11 += (d_0 * h_11 - h_01 * t_0 * h_01) * over
+            product *= abs(determinant) / (variance * variance)
+            if product > 1e100:
+                logs, product = logs + math.log(product), 1.0
+        a[n, 0, 0], a[n, 0, 1], a[n, 1, 0], a[n, 1, 1] = a_00, a_01, a_01, a_11
+        b[n, 0], b[n, 1], scattered[n], spread[n] = b_0, b_1, form, logs + math.log(product)
+    return a, b, scattered, spread
 
 
 def _huber_weights(d: Design, first: Index, m: Moments, w: _Working, value: FloatArray) -> FloatArray:
@@ -230,10 +216,9 @@ def _huber_weights(d: Design, first: Index, m: Moments, w: _Working, value: Floa
     s = m.c - m.h @ value
     k = np.linalg.inv(w.variance * np.eye(value.size) + m.h * w.between)
     own = value + w.between * np.einsum("gij,gj->gi", k, s)
-    run = run_numbers(d, first)
-    e = d.y - np.einsum("in,ni->n", d.columns, own[run])
-    scale = max(MAD * float(np.median(np.abs(e))), 1e-12)
-    weight: FloatArray = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(e), 1e-30))
+    e = np.abs(residuals(d.columns, d.y, first, own))
+    scale = max(MAD * float(np.median(e)), 1e-12)
+    weight: FloatArray = np.minimum(1.0, HUBER * scale / np.maximum(e, 1e-30))
     return weight
 
 
@@ -283,9 +268,8 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
     unit[unit == 0.0] = 1.0  # columns differ by orders of magnitude
     d = design._replace(columns=design.columns / unit[:, None])
     first = block_starts(d.run)
-    weight = np.ones_like(d.y)
-    plain = moments_of(d, first, weight)
-    working = _working_model(d, first, plain, weight)
+    plain = moments_of(d, first)
+    working = _working_model(d, first, plain)
     moments = _about_own_mean(d, plain, working)
     value, k = _solve(moments, working)
     for _ in range(ROUNDS if robust else 0):
@@ -297,8 +281,9 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
         if np.all(np.abs(value - old) <= 1e-4 * np.abs(value)):
             break
     half, dof = _half_widths(moments, k, value)
-    # a clipped residual does not depend on the coefficients, though its weight is not zero ([huber1981], chapter 7)
-    half = half * float(weight.mean() / max(float(np.mean(weight == 1.0)), 0.5))
+    if robust:
+        # a clipped residual does not depend on the coefficients, though its weight is not zero ([huber1981], chapter 7)
+        half = half * float(weight.mean() / max(float(np.mean(weight == 1.0)), 0.5))
     i = d.noisy.index(True) if any(d.noisy) else -1
     noise = 0.0
     if i >= 0:  # fast changes that y does not follow
@@ -343,8 +328,9 @@ def _half_widths(m: Moments, k: FloatArray, value: FloatArray) -> tuple[FloatArr
         sigma = math.sqrt(float(np.sum((score @ w) ** 2)))
         q = grow @ w
         r = np.einsum("gij,gj->gi", b, q)
-        omega = np.diag(np.einsum("gi,gi->g", q, r)) - r @ r.T
-        power = float(np.sum(omega * omega))
+        omega = r @ r.T
+        np.einsum("gg->g", omega)[:] -= np.einsum("gi,gi->g", q, r)
+        power = float(np.vdot(omega, omega))
         dof[i] = max(float(np.trace(omega)) ** 2 / power, 1.0) if power > 0.0 else 1.0
         half[i] = half_width(sigma, float(dof[i]))
     return half, dof

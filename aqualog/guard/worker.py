@@ -5,7 +5,9 @@ Results come as they are done, and nothing is lost by an interrupt or a crash.
 
 from __future__ import annotations
 
+import atexit
 import faulthandler
+import gc
 import multiprocessing
 import os
 import signal
@@ -67,12 +69,8 @@ class Raised(NamedTuple):
 class Worker:
     """A process that is spawned when it is needed: a fork would copy the threads of polars and numba.
 
-    Parameters
-    ----------
-    bounds : Bounds
-        Without `item.seconds`, a step of reading has the time of `reading`.
-    folder : str, optional
-        Where the process gets a folder of its own for temporary files, removed with it; default: it shares this one's.
+    Without `item.seconds` in `bounds`, a step of reading has the time of `reading`. In `folder` the process gets a
+    folder of its own for temporary files, removed with it; default: it shares this one's.
     """
 
     def __init__(self, bounds: Bounds, folder: str | None = None) -> None:
@@ -304,14 +302,8 @@ _lock = Lock()
 def kept_worker(bounds: Bounds, folder: str | None = None) -> Iterator[Callable[..., Any]]:
     """Within the block `do(work, *task)` calls `work(*task)` in another process; `Crashed` where that has ended it.
 
-    Parameters
-    ----------
-    bounds : Bounds
-        Of the work.
-    folder : str, optional
-        For temporary files, in a separate folder that is removed with the process; default: the system's.
-
-    One thread at a time has a process. It is kept for a while, since its start takes longer than many a log.
+    `folder`: for temporary files, in a separate folder that is removed with the process; default: the system's. One
+    thread at a time has a process, which is kept for a while: its start takes longer than many a log.
     """
     with _lock:
         worker = next((w for w in _idle if w.bounds == bounds), None)
@@ -380,6 +372,8 @@ def _serve(pipe: Connection[Any, Any], bounds: Bounds, scratch: str) -> None:
 def _begin(bounds: Bounds, scratch: str) -> None:
     """An interrupt is the parent's business; a worker finishes its item, and ends when its parent has."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    gc.set_threshold(200_000, 20)  # modules are no garbage to look for, least of all at the end, which is waited for
+    atexit.register(gc.freeze)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, [signal.SIGINT])
     os.environ.update(dict.fromkeys(_THREADS, "1"))  # one a process: these are as many as the cores

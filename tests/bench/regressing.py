@@ -43,7 +43,7 @@ def lines_with_aqualog(s: Samples) -> np.ndarray:
     cell = s.run * BINS + s.bin
     columns = np.stack([s.mu, np.ones_like(s.mu)])
     design = Design(columns, s.slip, cell, s.step, (True, True), (False, False))
-    m = moments_of(design, block_starts(cell), np.ones_like(s.mu))
+    m = moments_of(design, block_starts(cell))
     return np.linalg.solve(m.h, m.c[:, :, None])[:, :, 0]
 
 
@@ -59,17 +59,17 @@ def lines_with_scipy(s: Samples) -> np.ndarray:
 
 def slopes_with_aqualog(s: Samples) -> np.ndarray:
     """1 / slope of each bin with the half width of its interval (bins, 2), runs as the unit, as `bin-slipslope` has it."""
-    from aqualog.core.moments import Design
+    from aqualog.core.moments import Design, block_starts
     from aqualog.core.regression import estimate
 
     found = []
-    order = np.argsort(s.bin, kind="stable")
-    run, bins, step, mu_all, slip = (x[order] for x in s)
-    edges = np.searchsorted(bins, np.arange(BINS + 1))
-    for here in (slice(a, b) for a, b in itertools.pairwise(edges.tolist())):
-        mu = mu_all[here]
+    first = block_starts(s.run * BINS + s.bin)
+    cells = np.stack([first, np.append(first[1:], s.bin.size)], axis=1)
+    for k in range(BINS):
+        here = [slice(a, b) for a, b in cells[s.bin[first] == k].tolist()]
+        run, step, mu, slip = (np.concatenate([x[c] for c in here]) for x in (s.run, s.step, s.mu, s.slip))
         columns = np.stack([mu, np.ones_like(mu)])
-        e = estimate(Design(columns, slip[here], run[here], step[here], (True, True), (True, False)))
+        e = estimate(Design(columns, slip, run, step, (True, True), (True, False)))
         found.append((e.value[0], e.half[0]))
     return np.array(found)
 

@@ -92,6 +92,9 @@ def test_a_mean_is_a_random_effects_mean():
     assert found.value[0] == pytest.approx(levels.mean(), abs=2e-3)
     half = 3.182 * levels.std(ddof=1) / 2.0
     assert found.half[0] == pytest.approx(half, rel=0.05)
+    # a column twice: the normal equations have no inverse
+    twice = estimate(Design(np.ones((2, y.size)), y, run, np.arange(y.size), (True, True), (False, False)))
+    assert twice.value == pytest.approx([found.value[0] / 2.0] * 2, abs=found.half[0] / 4.0)
 
 
 def test_gaps_are_no_neighbours():
@@ -120,11 +123,8 @@ def test_likelihood_by_moments_is_that_of_the_covariance_matrix(p):
     """-2 log of the restricted likelihood with V = sigma^2 I + X T X' written out, run by run."""
     rng = np.random.default_rng(p)
     run = np.repeat(np.arange(4), [5, 9, 3, 7])
-    columns, y, variance = (
-        rng.normal(size=(p, run.size)) * 10.0 ** -np.arange(p)[:, None],
-        rng.normal(size=run.size),
-        0.3,
-    )
+    columns = rng.normal(size=(p, run.size)) * 10.0 ** -np.arange(p)[:, None]
+    y, variance = rng.normal(size=run.size), 0.3
     grid = np.concatenate([np.zeros((1, p)), 10.0 ** rng.uniform(-2, 2, (6, p))])
     d = Design(columns, y, run, np.arange(run.size), (True,) * p, (False,) * p)
     found = regression._unlikelihood(moments_of(d, block_starts(run), np.ones_like(y)), variance, grid)

@@ -1,5 +1,6 @@
 """An item that ends its process, takes too long or wants too much costs itself, and no other item."""
 
+import gc
 import os
 import time
 from pathlib import Path
@@ -95,6 +96,7 @@ def test_a_process_that_is_idle_ends(monkeypatch):
     with kept_worker(Bounds(NO_LIMITS, ReadLimits())) as do:
         number = do(os.getpid)
         assert do(os.getpid) == number
+        assert do(gc.get_threshold) > gc.get_threshold()  # imports are not searched for garbage
     for _ in range(100):
         if not Path(f"/proc/{number}").exists():
             break

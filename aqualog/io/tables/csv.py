@@ -26,7 +26,7 @@ from aqualog.io.tables.columns import (
 )  # fmt: skip
 from aqualog.io.tables.csv_cells import STYLES, numbers, plain
 from aqualog.io.tables.csv_dialect import Column, Layout, find_layout, is_comment, split_line
-from aqualog.io.tables.csv_text import TextFile, open_text, read_text
+from aqualog.io.tables.csv_text import TextFile, count_of, open_text, read_text
 
 __all__ = ["CsvReader"]
 
@@ -66,13 +66,14 @@ class RowFaults:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """The rows below the header: `text` has one row per line, `lines` (n,) are their line numbers in the file."""
+    """The rows below the header: `text` has one row per line from `start` on, `lines` (n,) are their line numbers."""
 
     text: bytes
     separator: str
     names: int
     lines: NDArray[np.int64]
     faults: RowFaults
+    start: int = 0
 
     def cells(self, columns: Sequence[int], *, where: str, numbers: Collection[int] = ()) -> dict[int, pl.Series]:
         """Cells of these columns as text, null where blank; as numbers those of `numbers`, if all of them are.
@@ -82,7 +83,7 @@ class Rows:
         LogError
             If the library finds another number of rows.
         """
-        if not self.text or not columns:
+        if not self.lines.size or not columns:
             return {k: pl.Series(f"c{k}", [], dtype=pl.String) for k in columns}
         try:
             frame = self._split(columns, numbers)
@@ -98,12 +99,10 @@ class Rows:
 
     def blank(self, which: BoolArray) -> BoolArray:
         """Those of some rows (n,) that hold nothing but separators, as spreadsheets leave them behind a table."""
-        found = np.zeros(len(self.lines), dtype=np.bool_)
-        if which.any():
-            lines = self.text.split(b"\n")
-            separator = self.separator.encode()
-            for k in np.flatnonzero(which):
-                found[k] = not lines[k].replace(separator, b"").strip()
+        found = np.zeros_like(which)
+        lines = self.text[self.start :].split(b"\n") if which.any() else []
+        for k in np.flatnonzero(which):
+            found[k] = not lines[k].replace(self.separator.encode(), b"").strip()
         return found
 
     def _split(self, columns: Sequence[int], numbers: Collection[int]) -> pl.DataFrame:
@@ -113,40 +112,35 @@ class Rows:
             schema={f"c{k}": pl.Float64 if k in numbers else pl.String for k in range(self.names)},
             columns=sorted(set(columns)),
             separator=self.separator,
-            quote_char='"' if self.separator != _JOIN and b'"' in self.text else None,
+            quote_char='"' if self.separator != _JOIN and self.text.find(b'"', self.start) >= 0 else None,
+            skip_lines=self.text.count(b"\n", 0, self.start),
         )
 
 
 def find_rows(data: bytes, layout: Layout) -> Rows:
     """Find the rows below the header; see `rows_of`."""
-    body = data[behind(data, layout.first_line - 1) : _end(data)]
-    return rows_of(body, layout, layout.first_line, is_cut=not data.endswith((b"\n", b"\r")))
+    is_cut, end = not data.endswith((b"\n", b"\r")), _end(data)
+    body = data if data[end:] in (b"", b"\n", b"\r\n") else data[:end]  # a copy would take as long as reading the file
+    return rows_of(body, layout, layout.first_line, is_cut=is_cut, start=behind(data, layout.first_line - 1))
 
 
-def rows_of(body: bytes, layout: Layout, first_line: int, *, is_cut: bool) -> Rows:
-    """Rows of lines below the header.
+def rows_of(body: bytes, layout: Layout, first_line: int, *, is_cut: bool, start: int = 0) -> Rows:
+    """Rows of whole lines below the header; the last one may do without its end.
 
-    Parameters
-    ----------
-    body : bytes
-        Whole lines, without the end of the last one.
-    layout : Layout
-    first_line : int
-        Number of the first of them in the file.
-    is_cut : bool
-        Whether the file ends behind them without the end of a line.
+    `first_line`: number of the first of them in the file, which is at the place `start` of `body`. `is_cut`: whether
+    the file ends behind them without the end of a line.
 
     Nearly all files are regular: every line has the separators of a whole row. Only such a file is passed to the
     library unchanged, because it silently drops the cells of longer rows and fills up shorter ones.
     """
-    lines = None if b"\0" in body else _regular(body, layout)
+    lines = None if b"\0" in body else _regular(body, layout, start)
     if lines is not None:
         numbers = first_line + np.arange(lines, dtype=np.int64)
         doubtful = int(numbers[-1]) if is_cut and lines and _ends_short(body, layout.separator) else 0
-        rows = Rows(body, layout.separator, len(layout.columns), numbers, RowFaults(doubtful_line=doubtful))
-        if b'"' not in body or _is_quoted_plainly(rows):
+        rows = Rows(body, layout.separator, len(layout.columns), numbers, RowFaults(doubtful_line=doubtful), start)
+        if body.find(b'"', start) < 0 or _is_quoted_plainly(rows):
             return rows
-    return _irregular(body, layout, first_line, is_cut=is_cut)
+    return _irregular(body[start : _end(body)], layout, first_line, is_cut=is_cut)
 
 
 def _ends_short(body: bytes, separator: str) -> bool:
@@ -182,7 +176,7 @@ def bodies(text: TextFile, at: int, line: int) -> Iterator[tuple[bytes, int, boo
         if body or last:
             yield body, line, last
         if not last:
-            line += body.count(b"\n") + 1
+            line += count_of(b"\n", body) + 1
             # the end of this body's last line
             rest = rest.removeprefix(b"\r").removeprefix(b"\n")
 
@@ -195,17 +189,19 @@ def _end(data: bytes) -> int:
     return end
 
 
-def _regular(body: bytes, layout: Layout) -> int | None:
-    """Number of lines if each has exactly the separators of a whole row and none is a comment."""
-    if not body:
+def _regular(body: bytes, layout: Layout, start: int) -> int | None:
+    """Number of lines from `start` on, if each has exactly the separators of a whole row and none is a comment."""
+    if not _end(body[start : start + 2]) and len(body) <= start + 2:
         return 0
     separator = layout.separator.encode()
     if layout.width > len(layout.columns):
         return None
-    signs = body.translate(None, _ALL.translate(None, separator + b"\n" + _COMMENT)) + b"\n"
+    others = _ALL.translate(None, separator + b"\n" + _COMMENT)
+    signs = body.translate(None, others)[len(body[:start].translate(None, others)) :]
+    signs = signs if body.endswith(b"\n") else signs + b"\n"
     comments = [sign for sign in _COMMENT if sign in signs and sign != separator[0]]
     if comments:
-        if body[0] in comments or any(b"\n%c" % sign in body for sign in comments):
+        if body[start] in comments or any(body.find(b"\n%c" % sign, start) >= 0 for sign in comments):
             return None
         signs = signs.translate(None, bytes(comments))
     row = separator * (layout.width - 1) + b"\n"
@@ -219,7 +215,8 @@ def _is_quoted_plainly(rows: Rows) -> bool:
     A line with an odd quote is a row of its own to the library only if it is the last one. A quoted cell that goes on
     behind its quote is lost.
     """
-    octets = np.frombuffer(b"\n" + rows.text + b"\n", dtype=np.uint8)
+    text = rows.text[rows.start : _end(rows.text)]
+    octets = np.frombuffer(b"\n" + text + b"\n", dtype=np.uint8)
     quotes = np.flatnonzero(octets == ord('"'))
     before = np.searchsorted(quotes, np.flatnonzero(octets == ord("\n")))  # quotes up to the end of each line
     if (before % 2).any():
@@ -287,7 +284,8 @@ class CsvReader(TableReader):
         self._told = format_of(options.csv, path.name)
         self._data: bytes | TextFile = self._text()
         self._layout = find_layout(self._data, where=str(path), told=self._told)
-        ends = self._data.count(b"\n") + (self._data[-1:] != b"\n")
+        ends = self._data.count(b"\n") if isinstance(self._data, TextFile) else count_of(b"\n", self._data)
+        ends += self._data[-1:] != b"\n"
         self._count = max(0, ends - self._layout.first_line + 1)
         self._size = len(self._data)
         kinds: list[FieldKind] = ["text" if c.kind == "blank" else c.kind for c in self._layout.columns]
@@ -427,9 +425,8 @@ class CsvReader(TableReader):
     def _as_stamps(self, column: Column, cells: pl.Series, day: pl.Series | None) -> Stamps:
         if column.kind in ("stamp", "clock"):
             with self._located():
-                return from_dates(cells, day, "clock" if column.kind == "clock" else "stamp")
-        values = numbers(cells, column.style).values
-        return from_numbers(values, self._time.unit, cells=plain(cells, column.style))
+                return from_dates(cells, day, column.kind)
+        return from_numbers(numbers(cells, column.style).values, self._time.unit, cells=plain(cells, column.style))
 
     def _found_rows(self) -> Rows:
         if self._rows is None:
