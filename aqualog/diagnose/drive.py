@@ -169,10 +169,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         bad |= lasting(np.diff(filled["a_x"], prepend=np.nan) == 0.0, FROZEN_S, dt)
     bad |= np.abs(np.gradient(speed, dt)) > A_X_MAX
     if "yaw_rate" in filled and (cornering := np.abs(v * filled["yaw_rate"]) > A_Y_MAX).any():
-        # a simulated car that slides shows nothing of the measured one
-        led = follow(vehicle, course, Model())
-        slides = np.abs(led["v_x"] * led["yaw_rate"]) > A_Y_MAX
-        bad |= cornering | (slides & (np.abs(led["v_x"] * (led["yaw_rate"] - filled["yaw_rate"])) > OTHERWISE))
+        bad |= cornering | _slides(filled["yaw_rate"], vehicle, course)
     # friction brakes are at every wheel: the torque of one axle cannot hold them
     every_wheel = torqued and all(f"torque_{w}" in filled for w in WHEELS)
     if "brake_pressure" in filled and not (every_wheel and brakes_in_torque(filled["brake_pressure"], torque)):
@@ -213,6 +210,14 @@ def rolling_under(drive: Drive, model: Model) -> Drive:
     floats = floating({}, drive.speed, drive.vehicle, drive.course, (model,))
     left_out = _widened(floats, BESIDE_S, drive.dt).astype(np.float64)
     return replace(drive, mask=drive.mask & (block_means(left_out, drive.dt) == 0.0))
+
+
+def _slides(yaw_rate: FloatArray, vehicle: Vehicle, course: Course) -> BoolArray:
+    """Samples in which the simulated car corners as a sliding one does, beside the measured yaw rate: it shows nothing
+    of the measured car there."""
+    led = follow(vehicle, course, Model())
+    v, turning = led["v_x"], led["yaw_rate"]
+    return np.asarray((np.abs(v * turning) > A_Y_MAX) & (np.abs(v * (turning - yaw_rate)) > OTHERWISE))
 
 
 def _without_lag(vehicle: Vehicle, course: Course, model: Model) -> Course:
