@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from aqualog.align.freezes import Freeze, Stretch, freeze_note, stand_watch_of, watch_of, within
+from aqualog.align.freezes import Freeze, Stretch, freeze_note, joined_note, stand_watch_of, watch_of, within
 from aqualog.align.glitches import KNOWN_NS, Glitches, glitches_of
-from aqualog.align.lines import joined_note, line_watch_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.timebase import MEDIAN_OF
 from aqualog.core.errors import ConfigError, SignalError
@@ -149,6 +148,8 @@ class Cleaner:
         self, name: str, entry: Entry, info: ChannelInfo, signal_map: SignalMap, vehicle: Vehicle,
         unmeasured: Unmeasured | None = None,
     ) -> None:  # fmt: skip
+        from aqualog.align.lines import line_watch_of  # compiled: only for whom reads samples
+
         self.info, self.where = info, f"{info.file}:{info.path}"
         self._name, self._symbol = name, SYMBOLS.get(name) or ACCEPTED[name]
         self._unit = entry.unit or info.unit

@@ -21,21 +21,8 @@ from aqualog.align.glitches import is_leap
 from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = [
-    "SPEEDS",
-    "Freeze",
-    "FreezeWatch",
-    "StandWatch",
-    "Stop",
-    "Stretch",
-    "dead_speeds",
-    "freeze_note",
-    "limits_of",
-    "longest_stop",
-    "stand_watch_of",
-    "standing_by",
-    "watch_of",
-    "while_moving",
-    "within",
+    "SPEEDS", "Freeze", "FreezeWatch", "StandWatch", "Stop", "Stretch", "dead_speeds", "freeze_note", "joined_note",
+    "limits_of", "longest_stop", "stand_watch_of", "standing_by", "watch_of", "while_moving", "within",
 ]  # fmt: skip
 
 Freeze = tuple[int, int]
@@ -124,47 +111,34 @@ class FreezeWatch:
 
     def push(self, t_ns: TimeArray, x: FloatArray) -> None:
         """Take samples (n,) at strictly increasing stamps, finite."""
+        from aqualog.align.lines import kept_values  # where no signal is checked, nothing is compiled
+
         if not t_ns.size:
             return
         if not self._t.size:
             self._since = self._first_ns = int(t_ns[0])
         t, x = np.concatenate([self._t, t_ns]), np.concatenate([self._x, x])
         self._t, self._x = t[-1:].copy(), x[-1:].copy()
-        steps, dt = np.diff(x), np.diff(t)
         if not self._is_awake:
-            self._wake(t, steps, dt)
-        is_moving = (np.abs(x[1:]) > self._standing) & (np.abs(x[:-1]) > self._standing) & (dt <= _GAP_NS)
-        self._moving_ns += int(dt[is_moving].sum())
-        self._count(steps[is_moving & (steps != 0.0)])
-        ends = np.flatnonzero((steps != 0.0) | (dt > _GAP_NS))
-        if ends.size:
-            starts = np.append(np.int64(self._since), t[ends[:-1] + 1])
-            self._since = int(t[ends[-1] + 1])
-            found = (t[ends] - starts >= self._least_ns) & (np.abs(x[ends]) > self._standing)
-            by = np.append(self._into, np.where(dt[ends] > _GAP_NS, np.nan, np.abs(steps[ends])))
-            self._into = float(by[-1])
-            columns = starts, t[ends], by[:-1], by[1:]
-            self._long += list(zip(*(c[found].tolist() for c in columns), strict=True))
+            self._wake(t, x)
+        limits, before = (self._standing, self._least_ns, _GAP_NS), (self._since, self._into, self._sign)
+        after, counts, smallest, ends, steps = kept_values(t, x, limits, before)
+        self._since, self._into, self._sign = after
+        sums = self._moving_ns, self._changes, self._turns
+        self._moving_ns, self._changes, self._turns = np.add(sums, counts).tolist()
+        self._smallest = min(self._smallest, smallest)
+        self._long += [(*a, *b) for a, b in zip(ends.tolist(), steps.tolist(), strict=True)]
 
-    def _wake(self, t: TimeArray, steps: FloatArray, dt: TimeArray) -> None:
+    def _wake(self, t: TimeArray, x: FloatArray) -> None:
         assert self._r_e is not None
-        changes = np.flatnonzero(steps != 0.0)
-        if not changes.size:
-            self._still += steps.size
+        changes = x[1:] != x[:-1]
+        if not changes.any():
+            self._still += changes.size
             return
-        k = int(changes[0])
+        k = int(np.argmax(changes))
         self._is_awake = True
-        if self._still + k >= _STILL and is_leap(dt[k : k + 1], self._r_e * steps[k : k + 1])[0]:
+        if self._still + k >= _STILL and is_leap(np.diff(t[k : k + 2]), self._r_e * np.diff(x[k : k + 2]))[0]:
             self._asleep = self._first_ns - 1, int(t[k])
-
-    def _count(self, changes: FloatArray) -> None:
-        if not changes.size:
-            return
-        signs = np.append(self._sign, np.sign(changes))
-        self._turns += int((signs[1:] * signs[:-1] < 0).sum())
-        self._sign = float(signs[-1])
-        self._changes += changes.size
-        self._smallest = min(self._smallest, float(np.abs(changes).min()))
 
     @property
     def is_noisy(self) -> bool:
@@ -255,6 +229,13 @@ def within(t_ns: TimeArray, stretches: tuple[Stretch, ...], *, has_end: bool) ->
         last = np.searchsorted(t_ns, end, side="right" if has_end else "left")
         out[np.searchsorted(t_ns, start, side="right") : last] = True
     return out
+
+
+def joined_note(where: str, count: int, first_ns: int, lines: tuple[Stretch, ...]) -> str:
+    """Describe what was left out because no sensor made it; `first_ns` is the signal's first stamp."""
+    spans = ", ".join(f"{(a - first_ns) * 1e-9:.1f} to {(b - first_ns) * 1e-9:.1f} s" for a, b in lines[:3])
+    more = f" and {len(lines) - 3} more times" if len(lines) > 3 else ""
+    return f"{where}: {count} samples ({spans}{more}) lie on a straight line: a gap that was filled, left out"
 
 
 def freeze_note(where: str, count: int, first_ns: int, freezes: tuple[Freeze, ...]) -> str:

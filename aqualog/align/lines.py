@@ -9,15 +9,15 @@ does not depend on how the signal is cut into pieces.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.align.freezes import Stretch
 from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
-__all__ = ["LineWatch", "joined_note", "line_watch_of"]
+__all__ = ["LineWatch", "kept_values", "line_watch_of"]
 
 _BLOCK_NS = 1_000_000_000
 _LEAST_SAMPLES = 5  # of a block that is judged
@@ -86,7 +86,7 @@ class LineWatch:
         self._finest = min(self._finest, finest)
         self._kept.append(_Block(t[start], x[start], t[after], x[after], off, np.diff(edges), changes, turns))
 
-    def finish(self) -> tuple[Stretch, ...]:
+    def finish(self) -> tuple[tuple[int, int], ...]:
         """List the stretches that are lines, in order: the last sample before, and the first behind."""
         if self._t.size:
             self._add(self._t, self._x, np.array([0, self._t.size]))
@@ -121,12 +121,13 @@ class LineWatch:
 @compiled
 def _starts(t, first_ns):  # type: ignore[no-untyped-def]
     """Return where the blocks begin that have samples."""
-    start, edge = [0], first_ns + ((t[0] - first_ns) // _BLOCK_NS + 1) * _BLOCK_NS
+    start, blocks, edge = np.empty_like(t), 0, first_ns
     for k in range(t.size):
         if t[k] >= edge:
-            start.append(k)
+            start[blocks] = k
+            blocks += 1
             edge += ((t[k] - edge) // _BLOCK_NS + 1) * _BLOCK_NS
-    return np.array(start)
+    return start[:blocks]
 
 
 @compiled
@@ -154,6 +155,35 @@ def _measured(t, x, edges):  # type: ignore[no-untyped-def]
     return after, off, changes, turns, finest
 
 
+@compiled
+def kept_values(t, x, limits, state):  # type: ignore[no-untyped-def]
+    """Return what `FreezeWatch` keeps of samples (n,): the last value's start [ns], the step to it, sign of the last
+    change; time that the car moved [ns], changes and turns in it; the smallest change; ends [ns] of long values and the
+    steps at them, (m, 2) each.
+    """
+    (standing, least_ns, gap_ns), (since, into, sign) = limits, state
+    moving_ns = changes = turns = 0
+    smallest, found = np.inf, 0
+    ends, steps = np.empty((t.size, 2), dtype=np.int64), np.empty((t.size, 2))
+    for k in range(t.size - 1):
+        step, dt = x[k + 1] - x[k], t[k + 1] - t[k]
+        is_gap, is_fast = dt > gap_ns, abs(x[k]) > standing
+        if is_fast and abs(x[k + 1]) > standing and not is_gap:
+            moving_ns += dt
+            if step != 0.0:
+                changes += 1
+                turns += step * sign < 0.0
+                sign = math.copysign(1.0, step)
+                smallest = min(smallest, abs(step))
+        if step != 0.0 or is_gap:
+            out = np.nan if is_gap else abs(step)
+            if is_fast and t[k] - since >= least_ns:
+                ends[found, 0], ends[found, 1], steps[found, 0], steps[found, 1] = since, t[k], into, out
+                found += 1
+            since, into = t[k + 1], out
+    return (since, into, sign), (moving_ns, changes, turns), smallest, ends[:found], steps[:found]
+
+
 def _runs(b: _Block, is_line: BoolArray, off: FloatArray) -> list[tuple[int, int]]:
     """Return first and last block of runs on one line, each as long as it gets from its beginning on."""
     found: list[tuple[int, int]] = []
@@ -175,10 +205,3 @@ def _slopes(b: _Block, first: int, k: int, off: float) -> tuple[float, float]:
     """Return the slopes between which a line from the first sample of a block ends within `off` of block k's end."""
     way_ns, rise = max(float(b.after_ns[k] - b.t_ns[first]), 1.0), float(b.after[k] - b.x[first])
     return (rise - off) / way_ns, (rise + off) / way_ns
-
-
-def joined_note(where: str, count: int, first_ns: int, lines: tuple[Stretch, ...]) -> str:
-    """Describe what was left out because no sensor made it; `first_ns` is the signal's first stamp."""
-    spans = ", ".join(f"{(a - first_ns) * 1e-9:.1f} to {(b - first_ns) * 1e-9:.1f} s" for a, b in lines[:3])
-    more = f" and {len(lines) - 3} more times" if len(lines) > 3 else ""
-    return f"{where}: {count} samples ({spans}{more}) lie on a straight line: a gap that was filled, left out"

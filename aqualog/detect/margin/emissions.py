@@ -20,18 +20,19 @@ __all__ = ["emissions_of"]
 VERSION = 2
 
 
-@lru_cache(maxsize=1)
-def _file() -> dict[str, Any]:
-    kept = tomllib.loads(files("aqualog.detect.margin").joinpath("emissions.toml").read_text(encoding="utf-8"))
+@lru_cache(maxsize=3)
+def _part(drivetrain: str) -> Any:
+    text = files("aqualog.detect.margin").joinpath("emissions.toml").read_text(encoding="utf-8")
+    head, *parts = text.split("\n[")  # a process reads one of three: the whole would take longer than a short log
+    kept = tomllib.loads("\n[".join([head, *(p for p in parts if p.startswith(f"{drivetrain}]"))]))
     if kept["version"] != VERSION:
         raise ValueError(f"emissions.toml has version {kept['version']}, this filter reads {VERSION}")
-    return kept
+    return kept[drivetrain]
 
 
 def emissions_of(drivetrain: str) -> Emissions:
     """Return what is learnt of cars with this drivetrain: `rwd`, `fwd` or `awd`."""
-    kept = _file()[drivetrain]
-    t = Emissions(*(np.array(kept[name], dtype=np.float64) for name in Emissions._fields))
+    t = Emissions(*(np.array(_part(drivetrain)[name], dtype=np.float64) for name in Emissions._fields))
     road = t.road.astype(int)
     # four digits of each share: in hours of standing their sum would make probability, or lose it
     t.kind_prior[:] /= np.bincount(road, t.kind_prior)[road]
