@@ -265,7 +265,7 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     if new.known:
         lines += ["", "[known]", "# faults of this car that are known", *known_lines(new)]
     if new.water:
-        lines += ["", "[water]", "# how its tyres float, for `simulate`", *water_lines(new)]
+        lines += ["", "[water]", "# how its tyres float", *water_lines(new)]
     for part in POLYNOMIALS:
         table = getattr(new, part)
         if not table:

@@ -47,7 +47,6 @@ LEAST_RATE_HZ = 5.0
 GAP_S = 0.25  # [s] longer gaps are not bridged
 FROZEN_S = 5.0  # [s] longer, a signal does not stay the same
 A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
-OTHERWISE = 2.0  # [m/s^2] by which a simulated car corners otherwise that has too little grip: else 0.2 (D)
 A_X_MAX = 6.0  # [m/s^2]
 # [m/s^3] at steeper torque the samples show clocks, filters and tyre lag: 10 ms are 0.1 m/s^2
 JERK_MAX, JERK_S = 10.0, 0.1
@@ -65,6 +64,7 @@ RESERVE = 2.0
 RECOVERY_S = 5.0
 RESERVED = (Model(), Model((Term(EFFECTS["contact_loss"], {"gain": RESERVE}),)))
 V_LEAST = 4.0  # [m/s] under the slip
+SPINS = 0.15  # slip of a wheel on dry road that its tyre no longer holds
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,16 +160,18 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     measured = Course(
         t, torque, steer, speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels, position=np.cumsum(v) * dt
     )
-    course = _without_lag(vehicle, measured, Model())
+    course = _without_lag(measured, led := follow(vehicle, measured, Model()))
     floats = floating(filled, v, vehicle, course)
     bad = gaps | (v < V_MIN)
     if not judges_afloat:
         bad |= floats
+        if _slides(led, vehicle).any():
+            bad |= _slides(follow(vehicle, course, Model()), vehicle)
     if "a_x" in filled:
         bad |= lasting(np.diff(filled["a_x"], prepend=np.nan) == 0.0, FROZEN_S, dt)
     bad |= np.abs(np.gradient(speed, dt)) > A_X_MAX
-    if "yaw_rate" in filled and (cornering := np.abs(v * filled["yaw_rate"]) > A_Y_MAX).any():
-        bad |= cornering | _slides(filled["yaw_rate"], vehicle, course)
+    if "yaw_rate" in filled:
+        bad |= np.abs(v * filled["yaw_rate"]) > A_Y_MAX
     # friction brakes are at every wheel: the torque of one axle cannot hold them
     every_wheel = torqued and all(f"torque_{w}" in filled for w in WHEELS)
     if "brake_pressure" in filled and not (every_wheel and brakes_in_torque(filled["brake_pressure"], torque)):
@@ -202,7 +204,8 @@ def led_by(drive: Drive, model: Model) -> Drive:
     `prepare` computes the target for the vehicle file's car. An effect that changes the acceleration by a makes that
     target wrong by a / FOLLOW_RATE: 0.2 m/s² of drag give 0.7 m/s, and the drag at that speed is 5 % off.
     """
-    return replace(drive, course=_without_lag(drive.vehicle, replace(drive.course, v_x=drive.speed), model))
+    measured = replace(drive.course, v_x=drive.speed)
+    return replace(drive, course=_without_lag(measured, follow(drive.vehicle, measured, model)))
 
 
 def rolling_under(drive: Drive, model: Model) -> Drive:
@@ -212,22 +215,20 @@ def rolling_under(drive: Drive, model: Model) -> Drive:
     return replace(drive, mask=drive.mask & (block_means(left_out, drive.dt) == 0.0))
 
 
-def _slides(yaw_rate: FloatArray, vehicle: Vehicle, course: Course) -> BoolArray:
-    """Samples in which the simulated car corners as a sliding one does, beside the measured yaw rate: it shows nothing
-    of the measured car there."""
-    led = follow(vehicle, course, Model())
-    v, turning = led["v_x"], led["yaw_rate"]
-    return np.asarray((np.abs(v * turning) > A_Y_MAX) & (np.abs(v * (turning - yaw_rate)) > OTHERWISE))
+def _slides(led: Mapping[str, FloatArray], vehicle: Vehicle) -> BoolArray:
+    """Samples in which the simulated car is turned back or one of its wheels spins: it shows nothing of the other."""
+    v = led["v_x"]
+    slip = (centre_line_speeds(led, vehicle) - v) / np.maximum(v, V_LEAST)
+    return np.asarray((led["slides"] > 0.0) | (np.abs(slip).max(axis=0) > SPINS))
 
 
-def _without_lag(vehicle: Vehicle, course: Course, model: Model) -> Course:
-    """The course with a target speed that makes the simulated speed meet the measured one without delay.
+def _without_lag(course: Course, led: Mapping[str, FloatArray]) -> Course:
+    """The course with a target speed that makes the simulated speed, `led` along it, meet the measured one.
 
     The simulation follows its target with a lag. A lagging copy of the measured speed's noise would look like a delayed
     signal.
     """
-    nudge = follow(vehicle, course, model)["nudge"]
-    return replace(course, v_x=course.v_x + nudge / FOLLOW_RATE)
+    return replace(course, v_x=course.v_x + led["nudge"] / FOLLOW_RATE)
 
 
 def _is_measured(signals: Signals, symbol: str) -> bool:

@@ -131,16 +131,20 @@ def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
 
 
 def limits(found: Sequence[PerTurn]) -> tuple[Limit, ...]:
-    """Amplitude of a ring that is named with a power of 0.9, of each wheel and of axles and sides with one value."""
+    """Amplitude of a ring that is named with a power of 0.9, of each wheel and of axles and sides with one value; NaN
+    beyond the effect's bound, and where a resonance covers it."""
     p = _RING.parameters[0]
-    sd = {f.wheel: 0.5 * (f.high - f.low) / Z for f in found if f.order == 1 and f.kind != "untested"}
-    own = {w: (w,) for w in sd} | {k: v for k, v in (AXLES | SIDES).items() if all(w in sd for w in v)}
+    once = {f.wheel: f for f in found if f.order == 1 and f.kind != "untested"}
+    own = {w: (w,) for w in once} | {k: v for k, v in (AXLES | SIDES).items() if all(w in once for w in v)}
     sure = sum(NormalDist().inv_cdf(q) for q in (SURE, POWER))
-    return tuple(
-        Limit(_RING.name, where, p.smallest + sure * math.hypot(
-            math.sqrt(sum(sd[w] ** 2 for w in wheels)) / len(wheels), DOUBT * p.smallest), p.unit, p.smallest)
-        for where, wheels in own.items()
-    )  # fmt: skip
+    out = []
+    for where, wheels in own.items():
+        sd = 0.5 / Z * math.hypot(*(once[w].high - once[w].low for w in wheels)) / len(wheels)
+        size = p.smallest + sure * math.hypot(sd, DOUBT * p.smallest)
+        size = p.smallest + sure * math.hypot(sd, DOUBT * size)  # the doubt is a share of the amplitude itself
+        hidden = size > p.high or any(once[w].kind == "speed" for w in wheels)
+        out.append(Limit(_RING.name, where, math.nan if hidden else size, p.unit, p.smallest))
+    return tuple(out)
 
 
 def _probability(wheels: Sequence[PerTurn], value: Estimate, smallest: float) -> float:

@@ -39,7 +39,7 @@ LEAST_ALONE = 0.02  # rms without torque and on one pass: 20 mg are an accelerom
 LEAST_BINS = 40
 STANDS_OUT = 4.0  # standard deviations of a correlation by chance
 SMOOTHED = 0.03  # share of the rms that smoothing may remove or noise may add
-# of the some 50 lags of a drive that differ, one is beyond 4 standard deviations by chance in one of 300 drives
+LAGS = 50.0  # of a drive that differ, each of which may look like a lap by chance
 LAP_LEAST_M, LAP_SIGMAS, LAP_CORRELATION = 500.0, 4.0, 0.7
 ALIKE_M = 2000.0  # [m] over which the road's autocorrelation counts
 GOES_WITH_ACCELERATION = slice(3, None)  # of the shapes of `_motion`
@@ -125,13 +125,13 @@ def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
     if bins is None:
         return None
     K = bins.smooth(bins.cleaned(bins.kinematic))
-    at, lap = bins.used, _lap(bins, K)
+    at, (lap, sigmas) = bins.used, _lap(bins, K)
     if bins.force is None:
         rough = float(np.sqrt(np.mean(K[at] ** 2))) / G
         if rough < (LEAST if lap is not None else LEAST_ALONE):
             return None
         z, shared = bins.kinematic, float("nan")
-        p = float("nan") if lap is None else math.erfc(LAP_SIGMAS / math.sqrt(2.0))
+        p = float("nan") if lap is None else min(1.0, LAGS * 0.5 * math.erfc(sigmas / math.sqrt(2.0)))
     else:
         F = bins.smooth(bins.cleaned(bins.force))
         common, shared, score = _together(K, K - F, at)
@@ -245,9 +245,10 @@ def _independent(a: FloatArray, b: FloatArray, at: BoolArray) -> float:
     return float(at.sum()) / max(total, 2.0 * OVER_M / BIN_M / 2.0)
 
 
-def _lap(bins: _Bins, K: FloatArray) -> float | None:
-    """Length after which the channel repeats itself along the road; a drifting sensor does not repeat. [m]"""
-    best, found = LAP_CORRELATION, None
+def _lap(bins: _Bins, K: FloatArray) -> tuple[float | None, float]:
+    """Length after which the channel repeats itself along the road [m], and by how many standard deviations; a drifting
+    sensor does not repeat."""
+    best, found, sigmas = LAP_CORRELATION, None, 0.0
     centred = np.where(bins.used, K - K[bins.used].mean(), 0.0)
     share = _independent(centred, centred, bins.used) / bins.used.sum()
     for lag in range(round(LAP_LEAST_M / BIN_M), K.size // 2 + 1):
@@ -258,9 +259,10 @@ def _lap(bins: _Bins, K: FloatArray) -> float | None:
         c = float(np.corrcoef(a, b)[0, 1])
         # the first lap, not a multiple of it
         nearer = found is None or c > best + 0.1 or lag * BIN_M < found + 3.0 * OVER_M
-        if c > best and nearer and _score(c, float(both.sum()) * share) > LAP_SIGMAS:
-            best, found = c, lag * BIN_M
-    return found
+        score = _score(c, float(both.sum()) * share)
+        if c > best and nearer and score > LAP_SIGMAS:
+            best, found, sigmas = c, lag * BIN_M, score
+    return found, sigmas
 
 
 def _estimate(bins: _Bins, z: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -10,6 +10,7 @@ import numpy as np
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
+from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import channel_values
 from aqualog.diagnose.drive import Drive, led_by, stretches
 from aqualog.diagnose.threads import beside
@@ -18,14 +19,14 @@ from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import STEP_S, Led, led_along, shown
 from aqualog.model.term import Effect, Model, Need, Parameter, Term
 
-__all__ = ["Hypothesis", "hypotheses", "residual", "signatures", "simulated", "value_in", "with_values"]
+__all__ = ["WORTH", "Hypothesis", "hypotheses", "residual", "signatures", "simulated", "value_in", "with_values"]
 
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
 WORTH = 2.0  # tolerances
 # of a scale of the speed or the acceleration without wheel speeds: between ten trips of one car the slope of the one
 # over the change of the other has a standard deviation of 0.02 (D): pitching, filters, hills
 OF_CHANGES, _OF_CHANGES = 0.02, ("velocity_scale", "accelerometer_gain")
-FITTED = 0.3  # share of what laws of water differ by that is left once a law is fitted to the car's own passes (K)
+POWER_OF_SPEED = 4.0  # of the speed of full aquaplaning, with which the lost contact goes
 ROUGH_S = 1e-2  # [s] step that is enough for differences of simulations on dry road
 MOST_LANES = 16  # that differ from each other; of more lanes, every 16th have a deviation in common
 
@@ -122,7 +123,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         if not asked:
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
         for where in () if is_sought else asked:
-            room = _room(effect, where, is_fitted=bool(drives[0].vehicle.water), wheels=wheels)
+            room = _room(effect, where, drives[0].vehicle, wheels=wheels)
             out += [Hypothesis(effect, where, free, fixed, room) for fixed in effect.drive.variants(length)]
     out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(() if torque else (STAND_IN,)))]
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
@@ -137,10 +138,12 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     return tuple(out), untested
 
 
-def _room(effect: Effect, where: str | None, *, is_fitted: bool, wheels: bool) -> float | None:
-    """Tolerance of a law of water that is fitted to the car, and of what shows in changes of the speed alone."""
-    if effect.of_water and is_fitted and effect.drive.tolerance is not None:
-        return FITTED * effect.drive.tolerance
+def _room(effect: Effect, where: str | None, car: Vehicle, *, wheels: bool) -> float | None:
+    """Tolerance of the lost contact of a car whose speed of full aquaplaning was fitted to its passes, by the spread of
+    that speed, and of what shows in changes of the speed alone."""
+    fitted = car.water.get("v_anchor")
+    if effect.name == "contact_loss" and fitted is not None and fitted.source in ("calibrated", "measured"):
+        return max(POWER_OF_SPEED * fitted.sd / fitted.value, TOLERANCE * effect.parameters[0].smallest)
     return OF_CHANGES if not wheels and effect.name in _OF_CHANGES and where in ("v_x", "a_x") else None
 
 

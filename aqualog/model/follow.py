@@ -76,7 +76,8 @@ def follow(
         Its terms act on car, road and sensors. The effect of a term on the sensors of torque, steering and velocity
         is undone before they drive the simulation: a torque that is reported late is applied earlier.
     rate : float
-        Rate at which the speed is drawn to the measured one, 16 times that at rest. [1/s] 0: it runs free.
+        Rate at which the speed is drawn to the measured one, 16 times that at rest. [1/s] 0: it runs free. At any
+        other rate a car whose rear axle slides is turned back.
     step : float
         Step of the integration, at most 10 ms. [s]
 
@@ -84,7 +85,8 @@ def follow(
     -------
     columns : dict of array (n,)
         Canonical signals on the grid of the course, without noise; `nudge` [m/s²] is the acceleration that drew the
-        speed to the measured one, `nudge_seen` the same as the accelerometer would measure it, `position` [m].
+        speed to the measured one, `nudge_seen` the same as the accelerometer would measure it, `slides` the share (0 to
+        1) by which it is turned back, `position` [m].
 
     Raises
     ------
@@ -137,7 +139,7 @@ def shown(truth: Truth, sensors: Sensors, course: Course) -> dict[str, FloatArra
             n = group.t.size  # the last sample of an open interval is held
             same = 0 <= course.t.size - n <= 1 and abs(group.t[-1] - course.t[n - 1]) < 1e-9
             out[name] = np.append(x, x[n - 1 : course.t.size - 1]) if same else np.interp(course.t, group.t, x)
-    for name in ("nudge", "position"):
+    for name in ("nudge", "slides", "position"):
         out[name] = np.interp(course.t, truth.t, truth.columns[name])
     # the accelerometer's delay and gain: a car whose signals are all late is the same car
     channel = sensors.channels.get("a_x", Channel())
@@ -197,7 +199,7 @@ def _skew(sensors: Sensors, name: str) -> float:
     return sum(g.skew_ppm for g in sensors.groups if name in g.signals) * 1e-6
 
 
-_SCALARS = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "position", "nudge")
+_SCALARS = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "position", "nudge", "slides")
 
 
 def _columns(rows: FloatArray, plant: Plant, scenario: Scenario, *, rods: bool) -> dict[str, FloatArray]:

@@ -46,8 +46,8 @@ NO_TORQUE: FloatArray = np.zeros((1, 4))
 # has, and what a rolling start differs by would last for seconds
 SLOW, AT_REST = 3.0, 15.0  # [m/s] below it the speed is drawn harder, at rest by so many times
 # nor does a measured car spin where the simulated one has too little grip: a rear axle that slides by this angle [rad]
-# is turned back at this rate [1/s], and the car drawn to its speed
-SLIDES, TURNED_BACK = 0.1, 8.0
+# is turned back at this rate [1/s], in full from half as much beyond it, to a lateral acceleration that tyres hold
+SLIDES, TURNED_BACK, BEYOND, HELD = 0.1, 8.0, 0.5, 5.0
 
 
 class Controls(NamedTuple):
@@ -182,16 +182,11 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
     slow = max(1.0 - c.v_target / SLOW, 0.0)
     nudge = p.follow * (1.0 + AT_REST * slow * slow) * (c.v_target - y[V_X])
     _move(m, a_x, a_y, slope_down / p.mass, moment / p.I_zz, nudge, p.roll_time)
-    slide = y[V_Y] - p.l_r * y[YAW_RATE]  # of the rear axle [m/s]
-    if p.follow > 0.0 and abs(slide) > SLIDES * max(y[V_X], SLOW):
-        turning = y[V_X] * np.tan(steer) / (p.l_f + p.l_r)
-        m.f[YAW_RATE] += TURNED_BACK * (turning - y[YAW_RATE])
-        m.f[V_Y] -= TURNED_BACK * slide
-        m.f[V_X] += TURNED_BACK * (c.v_target - y[V_X])
+    slides = _turned_back(m, p, wheels, c.v_target, steer) if p.follow > 0.0 else 0.0
     out = m.out
     if m.is_recorded > 0.0:
         out[AT.v_x], out[AT.a_x], out[AT.a_y], out[AT.yaw_rate] = y[V_X], a_x, a_y, y[YAW_RATE]
-        out[AT.steer_angle], out[AT.position], out[AT.nudge] = turned, position, nudge
+        out[AT.steer_angle], out[AT.position], out[AT.nudge], out[AT.slides] = turned, position, nudge, slides
     if m.is_detailed > 0.0:
         out[AT.v_y], out[AT.psi], out[AT.y_lat] = y[V_Y], y[PSI], y[Y_LAT]
         out[AT.drive_torque], out[AT.brake_torque] = command.drive, command.brake
@@ -238,6 +233,25 @@ def _move(m, a_x, a_y, uphill, turning, nudge, roll_time):  # type: ignore[no-un
     f[Y_LAT] = y[V_Y] * np.cos(y[PSI]) + y[V_X] * np.sin(y[PSI])
     f[A_X] = (a_x - y[A_X]) / roll_time
     f[A_Y] = (a_y - y[A_Y]) / roll_time
+
+
+@part
+def _turned_back(m, p, wheels, v_target, steer):  # type: ignore[no-untyped-def]
+    """Add to the derivatives what turns back a led car whose rear axle slides; return the share of it that acts."""
+    y, f = m.y, m.f
+    v = max(y[V_X], SLOW)
+    slide = y[V_Y] - p.l_r * y[YAW_RATE]
+    share = min((abs(slide) / (SLIDES * v) - 1.0) / BEYOND, 1.0)
+    if share <= 0.0:
+        return 0.0
+    rate = TURNED_BACK * share
+    turning = min(max(v * np.tan(steer) / (p.l_f + p.l_r), -HELD / v), HELD / v)
+    f[YAW_RATE] += rate * (turning - y[YAW_RATE])
+    f[V_Y] -= rate * slide
+    f[V_X] += rate * (v_target - y[V_X])
+    for i in range(4):
+        f[OMEGA + i] += rate * (v_target / wheels[i].r_e - y[OMEGA + i])
+    return share
 
 
 @_called

@@ -30,7 +30,7 @@ J_V, J_W = N_STATES, N_STATES + 8
 N_JACOBIAN = N_STATES + 16
 
 # what is recorded: of the car, and four of each wheel; motion first, which a drive that is followed needs alone
-_MOTION = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "position", "nudge")
+_MOTION = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "position", "nudge", "slides")
 _MOTION_WHEELS = ("omega", "angle", "torque")
 _SCALARS = (
     "v_y", "psi", "y_lat", "drive_torque", "brake_torque", "grade", "lane_front", "lane_rear", "drag", "held",

@@ -56,13 +56,19 @@ def plain():
 
 
 def test_a_car_that_slides_in_the_simulation_alone_shows_nothing_and_comes_back():
-    """It drives out of a bend at 10 m/s²; tyres of the file's grip slide there, and the simulated car spun for good."""
     speed = ((0.0, 18.0), (7.0, 18.0), (12.0, 36.0), (40.0, 36.0), (60.0, 25.0), (90.0, 25.0))
     car = replace(CAR, drivetrain="rwd", mu_max=2.0)
     log = signals(vehicle=car, speed=speed, steering=Steering(0.04, 4.0, 8.0, "lane_change"))
     d = prepare(log, replace(car, mu_max=0.6), "a")
     assert 70.0 < d.used_s < 80.0
-    assert np.abs(residual(d, Model())[d.channels.index("kinematic"), d.mask]).max() < 0.1
+    assert np.abs(residual(d, Model())[d.channels.index("kinematic"), d.mask]).max() < 0.6
+    led = follow(d.vehicle, d.course, Model())
+    assert 0.2 < led["slides"].max() < 0.55
+    assert 3.0 < np.count_nonzero(led["slides"]) * d.dt < 5.5
+    assert np.abs(led["v_x"] - d.speed).max() < 0.9
+    rim = np.array([led[f"omega_{w}"] * CAR.r_e(w) for w in WHEELS])
+    assert np.abs(rim / led["v_x"] - 1.0)[:, d.course.t > 14.0].max() < 0.033
+    assert prepare(changed(log, log.frame.drop("yaw_rate")), d.vehicle, "a").used_s < 85.0  # and without a gyro
 
 
 def test_a_dry_drive_is_used_whole():

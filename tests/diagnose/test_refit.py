@@ -146,7 +146,6 @@ def test_the_metric_is_that_of_the_tolerant_inner_products():
 
 
 def test_the_nearest_rival_of_each_effect_is_refitted(monkeypatch):
-    """Sets that differ in small members hold all of the first places, and all have the same main effect."""
     small = [one(name, w) for name in ("tyre_radius", "slip_stiffness") for w in ("fl", "fr", "rl", "rr")]
     d = prepare(signals(term("payload_mass", delta_mass=250.0), sensors=NOISY), CAR, "a")
     evidence = simulated([d], [one("payload_mass"), one("aero_drag"), *small], Model(), lambda _t, _s: None)

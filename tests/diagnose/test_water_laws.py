@@ -152,11 +152,11 @@ def test_no_name_for_what_laws_of_water_differ_by(gains, is_found):
 
 
 def test_a_law_that_is_fitted_to_the_car_is_driven_and_leaves_less_room():
-    known = replace(CAR, water={"v_anchor": WaterNumber(36.0, 0.3, "calibrated")})
+    known = replace(CAR, water={"v_anchor": WaterNumber(36.0, 1.2, "calibrated")})
     d = prepare(wet(), known, "a")
     own, usual = ({h.key: h for h in asked_of(x)}["contact_loss@f"] for x in (d, prepare(wet(), CAR, "a")))
-    assert own.tolerance("gain") == pytest.approx(0.3 * usual.tolerance("gain"))
-    assert own.worth_naming("gain") < usual.worth_naming("gain")
+    assert own.tolerance("gain") == pytest.approx(4.0 * 1.2 / 36.0)  # with the fourth power of the speed
+    assert (usual.tolerance("gain"), usual.worth_naming("gain")) == (0.4, 0.8)
     driven = [follow(car, d.course, Model())["omega_fl"] for car in (known, CAR)]
     assert np.ptp(driven, axis=0).max() > 0.05
 

@@ -78,8 +78,8 @@ cause, with its new value. `detect`, `simulate` and a campaign do not take them 
 """
 _WATER = """
 `[water]` holds numbers of the law of water for the tyres on this car. `aqualog calibrate --wet` writes them:
-`v_anchor = { value = 33.1, sd = 0.4, source = "calibrated" }`, or a plain number. A scenario's tyres take them, unless
-the scenario gives its own.
+`v_anchor = { value = 33.1, sd = 0.4, source = "calibrated" }`, or a plain number. `diagnose`, `validate` and a
+scenario's tyres take them, unless the scenario gives its own.
 """
 _PROVENANCE_SD = """
 The standard deviation of a value whose line gives none. [`[spread]`](#spread-between-drives) comes on top.

@@ -10,7 +10,7 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.campaign.passes import Passes, expected_values
 from aqualog.diagnose.evidence import Evidence
-from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
+from aqualog.diagnose.hypotheses import WORTH, Hypothesis, value_in, with_values
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 
@@ -35,7 +35,7 @@ def hypotheses(passes: Passes) -> tuple[Hypothesis, ...]:
     driven = {n[-2] for n in passes.names if n.startswith("slip_slope_")}
     searches = sorted(((e.campaign, e) for e in EFFECTS.values() if e.campaign is not None), key=lambda x: x[0].order)
     return tuple(
-        Hypothesis(e, where, tuple(p.name for p in e.parameters))
+        Hypothesis(e, where, tuple(p.name for p in e.parameters), room=e.parameters[0].smallest / WORTH)
         for asked, e in searches for where in asked.places if not asked.driven or where in driven
     )  # fmt: skip
 
