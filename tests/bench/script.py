@@ -28,7 +28,7 @@ def lowpass(x, tau):
 
 def spin_down(a, dv, v):
     """Sum of the deceleration beyond 3 m/s^2; the speed difference opens the gate and resets."""
-    g, active, bits = 0.0, False, []
+    g, active, held = 0.0, False, []
     for a_i, dv_i, v_i in zip((-a).tolist(), (-dv).tolist(), v.tolist(), strict=True):
         limit = max(0.5, 0.03 * v_i)
         g = min(3.0, max(0.0, g + (a_i - 3.0) * DT))
@@ -39,23 +39,24 @@ def spin_down(a, dv, v):
                 active, g = False, 0.0
         elif dv_i > limit and g > 0.6:
             active = True
-        bits.append(active)
-    return np.array(bits)
+        held.append(max(g, 1e-9) if active else 0.0)
+    return np.array(held)
 
 
 def resistance(x):
     """Sum of the resistance beyond 0.1 m/s^2; on above 0.2 m/s, off below 0.1."""
-    g, active, bits = 0.0, False, []
+    g, active, held = 0.0, False, []
     for x_i in x.tolist():
         g = min(0.3, max(0.0, g + (x_i - 0.1) * DT))
         active = g > (0.1 if active else 0.2)
-        bits.append(active)
-    return np.array(bits)
+        held.append(max(g, 1e-9) if active else 0.0)
+    return np.array(held)
 
 
-def events(bits, detector, wheel):
-    edges = np.flatnonzero(np.diff(np.r_[False, bits, False].astype(int))).reshape(-1, 2) * DT
-    return [{"detector": detector, "wheel": wheel, "start_s": a, "end_s": b} for a, b in edges.tolist()]
+def events(held, detector, wheel):
+    edges = np.flatnonzero(np.diff(np.r_[False, held > 0.0, False].astype(int))).reshape(-1, 2).tolist()
+    found = [{"start_s": a * DT, "end_s": b * DT, "peak": float(held[a:b].max())} for a, b in edges]
+    return [{"detector": detector, "wheel": wheel, **x} for x in found]
 
 
 def detect(path: Path, car: dict[str, Any]) -> list[dict[str, Any]]:
@@ -68,9 +69,8 @@ def detect(path: Path, car: dict[str, Any]) -> list[dict[str, Any]]:
     omega_dot = {}
     for wheel, (axle, side) in WHEELS.items():
         steer = s["steer_angle"] if axle == "f" else 0.0
-        length = car["l_f"] + car["l_r"]
         rim = s[f"omega_{wheel}"] * tyres[f"r_e_{axle}"]
-        w = (rim - yaw * length * np.sin(steer)) / np.cos(steer) + yaw * side * car["track"]
+        w = (rim - yaw * (car["l_f"] + car["l_r"]) * np.sin(steer)) / np.cos(steer) + yaw * side * car["track"]
         w = w * np.median(v / w)
         a_w = np.gradient(lowpass(w, 0.03), DT)
         omega_dot[wheel] = a_w / tyres[f"r_e_{axle}"]
@@ -88,5 +88,4 @@ def detect(path: Path, car: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 if __name__ == "__main__":
-    vehicle = tomllib.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))
-    json.dump(detect(Path(sys.argv[1]), vehicle), sys.stdout)
+    json.dump(detect(Path(sys.argv[1]), tomllib.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))), sys.stdout)

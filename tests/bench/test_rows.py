@@ -37,7 +37,7 @@ def test_the_script_finds_what_aqualog_finds(tmp_path):
 
     log, car = logs.one_log(tmp_path / "log.mf4", 120.0), load_vehicle(logs.CAR)
     found = detect_drive(load_signals([log], vehicle=car), car).events
-    ours = [{n: getattr(e, n) for n in ("detector", "wheel", "start_s", "end_s")} for e in found]
+    ours = [{n: getattr(e, n) for n in ("detector", "wheel", "start_s", "end_s", "peak")} for e in found]
     peer = script.detect(log, tomllib.loads(logs.CAR.read_text(encoding="utf-8")))
     assert detecting.unlike(ours, peer) == ""
     late = [{**e, "start_s": e["start_s"] + 30.0, "end_s": e["end_s"] + 30.0} for e in peer]
