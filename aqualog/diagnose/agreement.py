@@ -23,12 +23,11 @@ from aqualog.model.effects import EFFECTS
 __all__ = ["agreements", "widened"]
 
 
-def agreements(found: Found, r: Refit, base: FloatArray) -> tuple[Agreement, ...]:
+def agreements(found: Found, r: Refit) -> tuple[Agreement, ...]:
     """One agreement for each value of the refitted set; empty for a single drive.
 
-    `r`: its signatures at its values apply to every drive; `base` (k,): values without the effects. Uses the linear
-    model at the set's values: no drive is simulated again. Tolerances count for each drive separately, as if the file
-    had a different error in each.
+    `r`: its signatures at its values apply to every drive. Uses the linear model at the set's values: no drive is
+    simulated again. Tolerances count for each drive separately, as if the file had a different error in each.
     """
     evidence = found.arena.evidence
     drives = [evidence.drives[p.drive] for p in found.arena.parts]
@@ -41,10 +40,7 @@ def agreements(found: Found, r: Refit, base: FloatArray) -> tuple[Agreement, ...
     # the car's drive-to-drive spread is added to the variance of a single drive's value
     sd = np.array([np.sqrt(np.diag(np.linalg.inv(g + keep)) + apart**2) for g in G])
     others = np.array([np.linalg.solve(G.sum(axis=0) - g + keep, b.sum(axis=0) - x) for g, x in zip(G, b, strict=True)])
-    without = base - r.values
-    gains = [
-        0.5 * (_loss(g, x, without) - _loss(g, x, o)) for g, x, o in zip(G, b, others, strict=True)
-    ]  # fmt: skip
+    gains = [0.5 * (_loss(g, x, -r.off) - _loss(g, x, o)) for g, x, o in zip(G, b, others, strict=True)]
     out = []
     for k, (i, name) in enumerate(r.names):
         unit = r.members[i].parameter(name).unit

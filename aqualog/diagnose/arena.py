@@ -16,7 +16,7 @@ import numpy.typing as npt
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import block_step, contrasts
-from aqualog.diagnose.competition import Block
+from aqualog.diagnose.competition import Block, placed
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.evidence import Evidence, forgiving
 from aqualog.diagnose.hypotheses import residual
@@ -210,12 +210,9 @@ def known_only(arena: Arena, roads: Sequence[Block]) -> Arena:
     own = [*range(k), *(c for b in roads for c in b.columns)]
     tolerance = np.zeros((len(own), len(own)))
     tolerance[:k, :k] = arena.tolerance[:k, :k]
-    forgiven, at = [], k
-    for b in roads:
-        n = len(b.columns)
-        tolerance[at : at + n, at : at + n] = b.prior
-        forgiven.append(replace(b, columns=tuple(range(at, at + n))))
-        at += n
+    forgiven = placed(roads, k)
+    for b in forgiven:
+        tolerance[np.ix_(b.columns, b.columns)] = b.prior
     return replace(arena, blocks=blocks, sd=arena.sd[own], tolerance=tolerance, forgiven=tuple(forgiven))
 
 

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena, products
-from aqualog.diagnose.competition import COARSE, Block, State
+from aqualog.diagnose.competition import COARSE, Block, State, joined, placed
 from aqualog.diagnose.evidence import Evidence, forgiving
-from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, evidence_of, first_of, fitted_in, ranked, searched
+from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
 from aqualog.diagnose.threads import beside
@@ -142,12 +142,9 @@ def _beside(begun: Begun, members: Members, fit: Fitted | None) -> _Noise:
         values[:, fit.columns] = fit.mean + np.concatenate([z, -z])
         left = [p.residual - arena.made(i, values) for i, p in enumerate(arena.parts)]
     weighings = arena.weighed(left)
-    own, r = [], len(begun.columns[0])
-    at = r
-    for m in members:
-        b = arena.blocks[m]
-        own.append(replace(b, columns=tuple(range(at, at + len(b.columns)))))
-        at += len(b.columns)
+    r = len(begun.columns[0])
+    own = placed([arena.blocks[m] for m in members], r)
+    at = r + sum(len(b.columns) for b in own)
     gram = np.zeros((at + 1, at + 1))
     for i, (p, w) in enumerate(zip(arena.parts, weighings, strict=True)):
         drawn = w.rows(np.concatenate([*(arena.drawn(i, arena.blocks[m]) for m in members), p.residual[None]]))
@@ -156,7 +153,7 @@ def _beside(begun: Begun, members: Members, fit: Fitted | None) -> _Noise:
     allowed[:r, :r] = np.eye(r)
     forgiven = forgiving(gram, allowed)
     numbers = tuple(range(len(own)))
-    gained = evidence_of(own, forgiven.gram, numbers) + sum(b.log_prior for b in own)
+    gained = joined(forgiven.gram, own, numbers).evidence
     likely = gained - 0.5 * float(forgiven.gram[-1, -1]) - forgiven.room - sum(w.sharpness for w in weighings)
     found = fitted_in(own, forgiven.gram, numbers)
     columns = [c for m in members for c in arena.blocks[m].columns]

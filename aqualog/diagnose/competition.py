@@ -14,7 +14,7 @@ its logarithm counts instead: a coarsened posterior [miller2018].
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "COARSE", "SCALES", "Block", "Packed", "State", "added", "forgiving", "packed", "scored", "scores", "start",
-    "values",
+    "COARSE", "SCALES", "Block", "Packed", "State", "added", "joined", "packed", "placed", "scores",
 ]  # fmt: skip
 
 # share of the log-likelihood that counts in a competition: of 0.5, 0.35 and 0.25, tried on linear sets of 39
@@ -52,16 +51,13 @@ class Block:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Inner products (K + 1, K + 1) beside a set, the residual last; its evidence [nats (natural logarithm)]."""
+    """Inner products (K + 1, K + 1) beside a set, the residual last; its evidence with its prior [nats (natural
+    logarithm)]; `scales` of the members' priors that gain most."""
 
     inner: FloatArray
     members: tuple[int, ...] = ()
     evidence: float = 0.0
-
-
-def start(inner: FloatArray) -> State:
-    """Without any block."""
-    return State(inner)
+    scales: tuple[float, ...] = ()
 
 
 class Packed(NamedTuple):
@@ -122,15 +118,10 @@ def scores(inner: FloatArray, own: Packed) -> Scores:
     return Scores(np.where(np.isfinite(top), total, -np.inf), np.array(SCALES)[gains.argmax(axis=0)])
 
 
-def scored(state: State, block: Block) -> tuple[float, float]:
-    """Evidence gained by a block, over the scales of its prior, and the scale that gains most."""
-    gain, scale = scores(state.inner, packed([block])[0])
-    return float(gain[0]), float(scale[0])
-
-
 def added(state: State, index: int, block: Block) -> State:
     """The state with one block more."""
-    gained, scale = scored(state, block)
+    gain, scales = scores(state.inner, packed([block])[0])
+    gained, scale = float(gain[0]), float(scales[0])
     c = list(block.columns)
     B = state.inner[:, c]
     A = state.inner[np.ix_(c, c)]
@@ -138,31 +129,22 @@ def added(state: State, index: int, block: Block) -> State:
     BL = B @ L
     M = np.eye(L.shape[1]) + L.T @ A @ L
     inner = state.inner - BL @ np.linalg.solve(M, BL.T)
-    return State(inner, (*state.members, index), state.evidence + gained + block.log_prior)
+    evidence = state.evidence + gained + block.log_prior
+    return State(inner, (*state.members, index), evidence, (*state.scales, scale))
 
 
-def forgiving(state: State, columns: Sequence[int], sd: float) -> State:
-    """The state with columns that no set has to explain: their values have a standard deviation of `sd`, never more."""
-    c = list(columns)
-    A = state.inner[np.ix_(c, c)]
-    B = state.inner[:, c]
-    M = np.eye(len(c)) + sd * sd * A
-    inner = state.inner - sd * sd * B @ np.linalg.solve(M, B.T)
-    gained = 0.5 * float(state.inner[-1, -1] - inner[-1, -1]) - 0.5 * float(np.linalg.slogdet(M)[1])
-    return State(inner, state.members, state.evidence + gained)
+def joined(inner: FloatArray, blocks: Sequence[Block], members: Sequence[int]) -> State:
+    """A set's state, from inner products (K + 1, K + 1) without any block."""
+    state = State(inner)
+    for m in members:
+        state = added(state, m, blocks[m])
+    return state
 
 
-def values(
-    inner: FloatArray, blocks: Sequence[Block], scales: Sequence[float]
-) -> tuple[list[int], FloatArray, FloatArray]:
-    """Posterior means and covariance of all columns of a set together: columns, mean, covariance."""
-    columns = [c for b in blocks for c in b.columns]
-    k = len(columns)
-    P = np.zeros((k, k))
-    at = 0
-    for b, s in zip(blocks, scales, strict=True):
-        P[at : at + len(b.columns), at : at + len(b.columns)] = s * s * b.prior
-        at += len(b.columns)
-    G, y = inner[np.ix_(columns, columns)], inner[columns, -1]
-    cov = np.linalg.inv(np.linalg.inv(P) + G)
-    return columns, cov @ y, 0.5 * (cov + cov.T)
+def placed(blocks: Sequence[Block], first: int = 0) -> list[Block]:
+    """The same blocks with their columns one after another, from `first` on."""
+    ends = first + np.cumsum([len(b.columns) for b in blocks], dtype=np.intp)
+    return [
+        replace(b, columns=tuple(range(end - len(b.columns), end)))
+        for b, end in zip(blocks, ends.tolist(), strict=True)
+    ]  # fmt: skip

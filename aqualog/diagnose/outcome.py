@@ -51,16 +51,16 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
         if chosen is None:
             return ()
         # a member that is too small to be worth naming is not named: its sign says nothing against the others
-        return repeats(chosen, found.arena, noises, model, {c.key for c in best.large})
+        return repeats(chosen, found.arena, noises, {c.key for c in best.large})
 
     def causes_of(o: Option) -> tuple[tuple[Cause, bool], ...]:
         if o.refit is not None:
-            return tuple(_refitted(found, o.refit, model))
+            return tuple(_refitted(found, o.refit))
         return tuple(_linear(found.arena, found.posterior, o.members, model))
 
     sets = candidates([(o, o.evidence) for o in found.options], causes_of)
     d = decided(sets, lambda group: _at_place(found, group, model), failing)
-    if d.verdict == "cannot_tell" and not d.alternatives and d.best and not _is_gain(found, d.best.option.refit, model):
+    if d.verdict == "cannot_tell" and not d.alternatives and d.best and not _is_gain(found, d.best.option.refit):
         return Outcome("no_effect", notes=d.notes)
     return d._replace(notes=d.notes + _beyond(found.arena, d.best.option)) if d.best else d
 
@@ -85,7 +85,7 @@ def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) ->
 
     def sharper(s: Candidate[Option]) -> Candidate[Option]:
         refit, loss = sharpened(found, s.option, model)
-        causes = tuple(_refitted(found, refit, model)) if refit is not None else s.causes
+        causes = tuple(_refitted(found, refit)) if refit is not None else s.causes
         kept = replace(s, option=replace(s.option, refit=refit), causes=causes, sharp=loss)
         # with fewer tolerances a value may fall below what is worth naming
         return kept if kept.names == s.names else replace(s, sharp=loss)
@@ -96,16 +96,15 @@ def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) ->
     return max(as_good, key=lambda s: (whole(s), s.share))
 
 
-def _refitted(found: Found, r: Refit, model: Model) -> list[tuple[Cause, bool]]:
+def _refitted(found: Found, r: Refit) -> list[tuple[Cause, bool]]:
     """The members of a refitted set with values, intervals and sentences, and whether each is worth naming."""
     sd = np.sqrt(np.diag(r.covariance))
-    off = r.values - np.array([value_in(model, r.members[i], n) for i, n in r.names])
     out = []
     for i, h in enumerate(r.members):
         k = [k for k, (owner, _) in enumerate(r.names) if owner == i]
-        made = [np.tensordot(off[k], s[k], axes=1) for s in r.signatures]
+        made = [np.tensordot(r.off[k], s[k], axes=1) for s in r.signatures]
         explains = _explains(found.arena, [x + m for x, m in zip(r.residuals, made, strict=True)], r.residuals)
-        out.append(_cause(h, r.values[k], off[k], sd[k], explains))
+        out.append(_cause(h, r.values[k], r.off[k], sd[k], explains))
     return out
 
 
@@ -149,12 +148,11 @@ def _cause(
     return Cause(h.effect.name, h.where, parameters, explains, cause_sentence(h.effect, h.where, parameters)), large
 
 
-def _is_gain(found: Found, r: Refit | None, model: Model) -> bool:
+def _is_gain(found: Found, r: Refit | None) -> bool:
     """Whether a refitted set makes the channels' rms smaller on the whole; one that is not refitted may."""
     if r is None:
         return True
-    off = r.values - np.array([value_in(model, r.members[i], n) for i, n in r.names])
-    before = [x + np.tensordot(off, s, axes=1) for x, s in zip(r.residuals, r.signatures, strict=True)]
+    before = [x + np.tensordot(r.off, s, axes=1) for x, s in zip(r.residuals, r.signatures, strict=True)]
     return bool(_falls(found.arena, before, r.residuals).sum() > 0.0)
 
 
@@ -188,18 +186,14 @@ def with_causes(model: Model, causes: Sequence[Cause], asked: Sequence[Hypothesi
     return with_values(model, found)
 
 
-def repeats(
-    refit: Refit, arena: Arena, noises: Sequence[Noise], model: Model, names: Container[str]
-) -> tuple[str, ...]:  # fmt: skip
+def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Container[str]) -> tuple[str, ...]:
     """What speaks against naming some members of a refitted set, by their keys; empty if nothing does.
 
     Each third of the drives that says something of a value must give it the same sign, and must be predicted better
     with the values of the other two thirds than without the set. No value may stand at its physical bound.
     """
-    off = np.array(
-        [v - value_in(model, refit.members[i], n) for (i, n), v in zip(refit.names, refit.values, strict=True)]
-    )
-    G, b = _by_third(refit, arena, noises, off)
+    off = refit.off
+    G, b = _by_third(refit, arena, noises)
     prior = np.diag(np.array([refit.members[i].parameter(n).sigma for i, n in refit.names]) ** -2.0)
     out = []
     total = 0.0
@@ -223,14 +217,14 @@ def repeats(
 
 
 def _by_third(
-    refit: Refit, arena: Arena, noises: Sequence[Noise], off: FloatArray
-) -> tuple[list[FloatArray], list[FloatArray]]:
+    refit: Refit, arena: Arena, noises: Sequence[Noise]
+) -> tuple[list[FloatArray], list[FloatArray]]:  # fmt: skip
     """Inner products of the set's signatures, and theirs with the residual before it, by thirds of the used time."""
-    k = len(off)
+    k = len(refit.off)
     G, b = [np.zeros((k, k)) for _ in range(THIRDS)], [np.zeros(k) for _ in range(THIRDS)]
     for part, noise in zip(arena.parts, noises, strict=True):
         own, after = refit.signatures[part.drive][..., part.at], refit.residuals[part.drive][:, part.at]
-        before = after + np.tensordot(off, own, axes=1)
+        before = after + np.tensordot(refit.off, own, axes=1)
         rows = whitened(bridged(np.concatenate([own, before[None]]), part.mask), noise)
         rows = rows.reshape(k + 1, *after.shape)
         third = np.minimum(THIRDS * np.cumsum(part.mask) // max(int(part.mask.sum()), 1), THIRDS - 1)

@@ -32,15 +32,16 @@ FREEDOM = 3.0  # degrees of the distribution of sizes: the fewest with a varianc
 class Refit:
     """A set at its best values.
 
-    `values` (k,) absolute, `covariance` (k, k) without inflation, `loss` the sum of squares in the metric of noise and
-    tolerances, plus the penalty of values beyond their usual sizes; `residuals` (C, n) and `signatures` (k, C, n) per
-    drive at these values; `bounded` (k,): whether a value sits at its physical bound; `unlikely`: the share of `loss`
-    due to that penalty; `apart` (k,): standard deviations by which the car's drives differ, in `covariance`.
+    `values` (k,) absolute, `off` (k,) from those of the model that it came on, `covariance` (k, k) without inflation,
+    `loss` the sum of squares in the metric of noise and tolerances, plus the penalty of values beyond their usual
+    sizes; `residuals` (C, n) and `signatures` (k, C, n) per drive at these values; `bounded` (k,): whether a value sits
+    at its physical bound; `unlikely`: the share of `loss` due to that penalty.
     """
 
     members: tuple[Hypothesis, ...]
     names: tuple[tuple[int, str], ...]
     values: FloatArray
+    off: FloatArray
     covariance: FloatArray
     loss: float
     model: Model
@@ -48,7 +49,6 @@ class Refit:
     signatures: tuple[FloatArray, ...]
     bounded: tuple[bool, ...]
     unlikely: float = 0.0
-    apart: FloatArray | None = None
 
     @property
     def at_bound(self) -> bool:
@@ -195,21 +195,12 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
         J = measure.rows(here)
     covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0)) + np.diag(measure.apart[columns] ** 2)
     bounded = tuple(bool(x) for x in (values <= low + 1e-12) | (values >= high - 1e-12))
-    unlikely = _unlikely((values - base) / evidence.prior[columns])
-    loss += unlikely - float((((values - base) / width) ** 2).sum())
+    off = values - base
+    unlikely = _unlikely(off / evidence.prior[columns])
+    loss += unlikely - float(((off / width) ** 2).sum())
     return Refit(
-        members,
-        names,
-        values,
-        np.asarray(covariance),
-        loss,
-        extended,
-        tuple(residuals),
-        here,
-        bounded,
-        unlikely,
-        measure.apart[columns],
-    )
+        members, names, values, off, np.asarray(covariance), loss, extended, tuple(residuals), here, bounded, unlikely
+    )  # fmt: skip
 
 
 def _unlikely(z: FloatArray) -> float:

@@ -26,7 +26,7 @@ from aqualog.diagnose.faster import faster, joined, with_rings
 from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.grade import Profile, find_profile, with_profile
-from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, value_in, with_values
+from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, with_values
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
@@ -105,7 +105,7 @@ def diagnose(
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(found, model)
     chosen = outcome.best.option.refit if outcome.best else None
-    outcome, agreed = _by_drive(found, outcome, chosen, model)
+    outcome, agreed = _by_drive(found, outcome, chosen)
     quiet = evidence.residuals if chosen is None else chosen.residuals
     noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, ready, strict=True)]
     if road is not None:
@@ -215,13 +215,11 @@ def _gained(
     )  # fmt: skip
 
 
-def _by_drive(
-    found: Found, outcome: Outcome[Option], r: Refit | None, model: Model
-) -> tuple[Outcome[Option], tuple[Agreement, ...]]:
+def _by_drive(found: Found, outcome: Outcome[Option], r: Refit | None) -> tuple[Outcome[Option], tuple[Agreement, ...]]:
     """Values of the chosen set drive by drive; intervals grow where the drives differ."""
     if r is None:
         return outcome, ()
-    agreed = agreements(found, r, np.array([value_in(model, r.members[i], n) for i, n in r.names]))
+    agreed = agreements(found, r)
     causes = tuple(widened(c, agreed) for c in outcome.causes)
     named = {c.key for c in causes}
     return outcome._replace(causes=causes), tuple(a for a in agreed if a.key in named)

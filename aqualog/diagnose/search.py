@@ -20,10 +20,10 @@ from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import Arena, known_only, make_arena
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.compete import Members, Posterior, begin, compete, fitted
-from aqualog.diagnose.competition import COARSE, added, forgiving, start
+from aqualog.diagnose.competition import COARSE, joined, placed
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import with_elements
-from aqualog.diagnose.evidence import Evidence, make_evidence, tolerant
+from aqualog.diagnose.evidence import Evidence, forgiving, make_evidence, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
 from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
@@ -185,7 +185,7 @@ def _repeated(
         found = refit(led, best, _start(arena, posterior, posterior.best), measure, model)
         if found is None or found.at_bound:
             break
-        arena, done = _around(arena, found, best, model), best
+        arena, done = _around(arena, found, best), best
         posterior = compete(arena)
     return arena, posterior
 
@@ -208,12 +208,7 @@ def _led(evidence: Evidence, arena: Arena, posterior: Posterior, model: Model) -
         return evidence
 
 
-def _off(r: Refit, model: Model) -> FloatArray:
-    """Changes of a refitted set's values. (k,)"""
-    return np.asarray(r.values - [value_in(model, r.members[i], n) for i, n in r.names])
-
-
-def _around(arena: Arena, found: Refit, chosen: Sequence[int], model: Model) -> Arena:
+def _around(arena: Arena, found: Refit, chosen: Sequence[int]) -> Arena:
     """The arena with a set's signatures at its own values.
 
     Residuals are those that a linear model around these values would have had at the start, so that the competition can
@@ -225,7 +220,7 @@ def _around(arena: Arena, found: Refit, chosen: Sequence[int], model: Model) -> 
         own = found.signatures[p.drive][..., p.at]
         changed = p.signatures.copy()
         changed[columns] = own
-        at_start = found.residuals[p.drive][:, p.at] + np.tensordot(_off(found, model), own, axes=1)
+        at_start = found.residuals[p.drive][:, p.at] + np.tensordot(found.off, own, axes=1)
         parts.append(replace(p, signatures=changed, residual=at_start))
     return replace(arena, parts=tuple(parts))
 
@@ -266,9 +261,9 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     def one(members: Members) -> Option | None:
         own = _effects(arena, members)
         found = refit(led, own, _start(arena, posterior, members), measure, model)
-        if found is None or _is_nothing(found, model):
+        if found is None or _is_nothing(found):
             return None
-        return Option(members, _evidence(arena, found, own, measure, model, nothing), found)
+        return Option(members, _evidence(arena, found, own, measure, nothing), found)
 
     done = dict(zip(chosen, beside(one, chosen), strict=True))
     within = {m: _within(o) for m, o in done.items() if o is not None}
@@ -288,7 +283,7 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
         if kept in out and out[kept].evidence < out[m].evidence:
             out[kept] = replace(out[kept], evidence=out[m].evidence, beyond=tuple(b for b in m if b not in kept))
     out = {m: o for m, o in out.items() if (within.get(m, m) == m if o.refit else not beyond & set(m))}
-    return _levelled(evidence, arena, out, within.get(best, best), equal, model)
+    return _levelled(evidence, arena, out, within.get(best, best), equal)
 
 
 def _within(option: Option) -> Members:
@@ -300,7 +295,7 @@ def _within(option: Option) -> Members:
 
 
 def _levelled(
-    evidence: Evidence, arena: Arena, options: dict[Members, Option], best: Members, equal: set[Members], model: Model
+    evidence: Evidence, arena: Arena, options: dict[Members, Option], best: Members, equal: set[Members]
 ) -> list[Option]:
     """Options whose evidence does not rest on what no log shows, or no law of water knows.
 
@@ -313,7 +308,7 @@ def _levelled(
     for members, o in options.items():
         gained = o.evidence
         if members in equal and o.refit is not None:
-            if top is None or top.refit is None or not _plausible(o.refit, model):
+            if top is None or top.refit is None or not _plausible(o.refit):
                 continue
             worse = (o.refit.loss - o.refit.unlikely) - (top.refit.loss - top.refit.unlikely)
             gained = top.evidence - 0.5 * max(worse, 0.0)
@@ -331,41 +326,32 @@ def _levelled(
     return out
 
 
-def _is_nothing(r: Refit, model: Model) -> bool:
+def _is_nothing(r: Refit) -> bool:
     """Whether a value stands at a bound that means no effect: a trailer of no mass."""
-    return r.at_bound and bool(np.any(np.abs(_off(r, model)) < 1e-12))
+    return r.at_bound and bool(np.any(np.abs(r.off) < 1e-12))
 
 
-def _evidence(
-    arena: Arena, found: Refit, own: Sequence[int], measure: Metric, model: Model, nothing: float
-) -> float:  # fmt: skip
+def _evidence(arena: Arena, found: Refit, own: Sequence[int], measure: Metric, nothing: float) -> float:
     """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values.
 
     `nothing`: half the sum of squares without any effect.
     """
     columns = [c for h in own for c in arena.evidence.columns[h]]
-    off = _off(found, model)
     J = measure.rows(found.signatures) * arena.sd[columns, None]
-    y = measure.rows([r[None] for r in found.residuals])[0] + (off / arena.sd[columns]) @ J
-    doubtful = _doubtful(arena, found, off)
+    y = measure.rows([r[None] for r in found.residuals])[0] + (found.off / arena.sd[columns]) @ J
+    doubtful = _doubtful(arena, found)
     doubts, exact = measure.rows(doubtful, np.float32), np.concatenate([J, y[None]])
     order = [*range(len(J)), *range(len(exact), len(exact) + len(doubts)), len(J)]  # the residual last
     shared = measure.inner(exact, doubts)
     gram = np.block([[measure.inner(exact, exact), shared], [shared.T, measure.inner(doubts, doubts)]])
-    state = start(gram[np.ix_(order, order)])
-    at = 0
+    allowed = np.diag(DOUBT**2 * (np.arange(len(order) - 1) >= len(J)))
+    forgiven = forgiving(gram[np.ix_(order, order)], allowed)
     by_tag = {b.tag: b for b in arena.blocks}
-    loss = 0.5 * float(state.inner[-1, -1])
-    if len(doubts):
-        state = forgiving(state, range(len(J), len(J) + len(doubts)), DOUBT)
-    for i, h in enumerate(own):
-        b = by_tag[h]
-        state = added(state, i, replace(b, columns=tuple(range(at, at + len(b.columns)))))
-        at += len(b.columns)
-    return state.evidence + nothing - loss
+    state = joined(forgiven.gram, placed([by_tag[h] for h in own]), range(len(own)))
+    return state.evidence + nothing - 0.5 * float(forgiven.gram[-1, -1]) - forgiven.room
 
 
-def _doubtful(arena: Arena, found: Refit, off: FloatArray) -> list[FloatArray]:
+def _doubtful(arena: Arena, found: Refit) -> list[FloatArray]:
     """What each value shows in one channel, in that channel and in each other one of its unit, where it is large there.
 
     (m, C, n) of each drive. No simulator has a car's response exactly: a body that pitches on a slope lets the
@@ -373,7 +359,7 @@ def _doubtful(arena: Arena, found: Refit, off: FloatArray) -> list[FloatArray]:
     for that.
     """
     channels = arena.parts[0].channels
-    count = len(channels)
+    count, off = len(channels), found.off
     size, noise = np.zeros((off.size, count)), np.zeros(count)
     for p in arena.parts:
         size += ((off[:, None, None] * found.signatures[p.drive][..., p.at][..., p.mask]) ** 2).sum(axis=-1)
@@ -410,13 +396,12 @@ def _about_water(evidence: Evidence, arena: Arena, members: Members) -> bool:
     return any(evidence.asked[h].of_water for h in _effects(arena, members))
 
 
-def _plausible(r: Refit, model: Model) -> bool:
+def _plausible(r: Refit) -> bool:
     """Whether every value is worth naming and within three times its usual size: a huge offset is no likely rival."""
-    off = _off(r, model)
     own = [(r.members[i], r.members[i].parameter(n), n) for i, n in r.names]
     return all(
         abs(x) >= h.worth_naming(n) and abs(v - p.neutral) <= UNUSUAL * p.sigma
-        for (h, p, n), v, x in zip(own, r.values.tolist(), off.tolist(), strict=True)
+        for (h, p, n), v, x in zip(own, r.values.tolist(), r.off.tolist(), strict=True)
     )
 
 
@@ -432,7 +417,7 @@ def sharpened(found: Found, option: Option, model: Model) -> tuple[Refit | None,
     columns = [c for h in own for c in evidence.columns[h]]
     led = replace(evidence, drives=tuple(led_by(d, option.refit.model) for d in evidence.drives))
     measure = metric(found.arena, found.posterior.weighings, share=KNOWN, beside=columns)
-    again = refit(led, own, _off(option.refit, model), measure, model)
+    again = refit(led, own, option.refit.off, measure, model)
     known = metric(found.arena, found.posterior.weighings, share=KNOWN)
 
     def loss(r: Refit) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.diagnose.competition import SCALES, Block, Packed, State, added, packed, scored, scores, start, values
+from aqualog.diagnose.competition import SCALES, Block, Packed, State, added, joined, packed, scores
 
 __all__ = [
     "Fitted", "MayJoin", "Members", "Sets", "evidence_of", "first_of", "fitted_in", "ranked",
@@ -55,21 +55,19 @@ class Fitted:
 
 def fitted_in(blocks: Sequence[Block], inner: FloatArray, members: Sequence[int]) -> Fitted:
     """Values of all columns of a set together, from inner products (K + 1, K + 1) whose last row is the residual."""
-    state = start(inner)
-    scales = []
-    for m in members:
-        scales.append(scored(state, blocks[m])[1])
-        state = added(state, m, blocks[m])
-    return Fitted(*values(inner, [blocks[m] for m in members], scales))
+    columns = [c for m in members for c in blocks[m].columns]
+    P, at = np.zeros((len(columns), len(columns))), 0
+    for m, s in zip(members, joined(inner, blocks, members).scales, strict=True):
+        own = slice(at, at + len(blocks[m].columns))
+        P[own, own] = s * s * blocks[m].prior
+        at = own.stop
+    cov = np.linalg.inv(np.linalg.inv(P) + inner[np.ix_(columns, columns)])
+    return Fitted(columns, cov @ inner[columns, -1], 0.5 * (cov + cov.T))
 
 
 def evidence_of(blocks: Sequence[Block], inner: FloatArray, members: Sequence[int]) -> float:
     """Log of the marginal likelihood that a set gains, without its prior. [nats (natural logarithm)]"""
-    state, total = start(inner), 0.0
-    for m in members:
-        total += scored(state, blocks[m])[0]
-        state = added(state, m, blocks[m])
-    return total
+    return joined(inner, blocks, members).evidence - sum(blocks[m].log_prior for m in members)
 
 
 def ranked(sets: Mapping[Members, float], name: Callable[[int], str]) -> Sets:
@@ -97,10 +95,7 @@ def first_of(
     blocks: Sequence[Block], inner: FloatArray, name: Callable[[int], str], beside: Members = ()
 ) -> list[int]:  # fmt: skip
     """The few known effects, each at its best place, and the few other blocks that gain most beside a set."""
-    state = start(inner)
-    for m in beside:
-        state = added(state, m, blocks[m])
-    gains = _gains(state, blocks, packed(blocks), inner)
+    gains = _gains(joined(inner, blocks, beside), blocks, packed(blocks), inner)
     order = [i for i in np.argsort(-gains, kind="stable").tolist() if i not in beside and gains[i] > 0.0]
     known: dict[str, int] = {}
     for i in order:
@@ -128,7 +123,7 @@ def searched(
             if i not in state.members and may_join(state, blocks[i])
         ]
 
-    states = [start(inner)]
+    states = [State(inner)]
     sets: dict[Members, float] = {(): 0.0}
     for _ in range(MOST):
         new: dict[Members, tuple[float, State, int]] = {}
@@ -146,10 +141,7 @@ def searched(
         states = [added(state, i, blocks[i]) for _, state, i in top]
     for members in sorted(sets, key=lambda k: -sets[k])[: min(SWAPPED, width)]:
         for out in members if len(members) > 1 else ():
-            state = start(inner)
-            for m in members:
-                if m != out:
-                    state = added(state, m, blocks[m])
+            state = joined(inner, blocks, [m for m in members if m != out])
             for i, gain in joining(state):
                 key = tuple(sorted((*state.members, i)))
                 sets[key] = max(sets.get(key, -math.inf), state.evidence + gain)

@@ -8,7 +8,6 @@ import pytest
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.outcome import repeats
 from aqualog.diagnose.records import tempered
-from aqualog.model.term import Model
 from tests.diagnose.test_unexplained import arena
 
 
@@ -16,11 +15,11 @@ def speaking(a, value, before, names, *, at_bound=False):
     """What speaks against names of a set of one effect, fitted with this value to a residual."""
     own, h = a.evidence.signatures[0][:1], a.evidence.asked[0]
     refit = SimpleNamespace(
-        members=(h,), names=((0, h.free[0]),), values=np.array([value]), residuals=(before - value * own[0],),
+        members=(h,), names=((0, h.free[0]),), values=np.array([value]), off=np.array([value]), residuals=(before - value * own[0],),
         signatures=(own,), bounded=(at_bound,),
     )  # fmt: skip
     noises = [fit_noise(a.evidence.residuals[0], a.evidence.drives[0].mask, np.eye(1))]
-    return repeats(refit, a, noises, Model(), names)
+    return repeats(refit, a, noises, names)
 
 
 @pytest.mark.parametrize(("last", "speaks"), [(1.0, False), (-1.5, True)])

@@ -10,6 +10,7 @@ import pytest
 from aqualog.diagnose import outcome
 from aqualog.diagnose.arena import arena_of
 from aqualog.diagnose.compete import compete
+from aqualog.diagnose.hypotheses import value_in
 from aqualog.diagnose.outcome import conclude
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import Found, Option
@@ -32,15 +33,15 @@ def few(monkeypatch):
     monkeypatch.setattr(outcome, "repeats", lambda *_: ())
 
 
-def option(evidence=SURE, sharp=0.0, signatures=S, **values):
+def option(evidence=SURE, sharp=0.0, signatures=S, model=Model(), **values):  # noqa: B008 - frozen
     """A refitted set: key (`tyre_radius_fl` for `tyre_radius@fl`) to absolute value, each with an sd of a tenth."""
     index = [next(i for k, i in AT.items() if k.replace("@", "_") == name) for name in values]
     members = tuple(ASKED[i] for i in index)
     x = np.array(list(values.values()))
     names = tuple((k, h.free[0]) for k, h in enumerate(members))
-    neutral = np.array([h.parameter(h.free[0]).neutral for h in members])
-    cov = np.diag((0.1 * (x - neutral)) ** 2)
-    r = Refit(members, names, x, cov, 0.0, Model(), (LEFT,), (signatures[index],), (False,) * len(index), sharp)
+    off = x - [value_in(model, h, h.free[0]) for h in members]
+    cov = np.diag((0.1 * off) ** 2)
+    r = Refit(members, names, x, off, cov, 0.0, Model(), (LEFT,), (signatures[index],), (False,) * len(index), sharp)
     blocks = tuple(next(b for b, block in enumerate(ARENA.blocks) if block.tag == i) for i in index)
     return Option(blocks, evidence, r)
 
@@ -153,7 +154,7 @@ def test_a_value_is_judged_against_the_model_at_hand():
     from tests.diagnose.test_drive import term
 
     known = Model((term("payload_mass", delta_mass=195.0),))
-    assert told(option(payload_mass=200.0), model=known).verdict == "no_effect"
+    assert told(option(payload_mass=200.0, model=known), model=known).verdict == "no_effect"
 
 
 def test_a_cause_explains_the_channels_that_it_takes_away():

@@ -10,7 +10,7 @@ from aqualog.diagnose import run, spectrum, unexplained
 from aqualog.diagnose.arena import arena_of
 from aqualog.diagnose.channels import block_means
 from aqualog.diagnose.compete import compete
-from aqualog.diagnose.competition import Block, added, scored, start
+from aqualog.diagnose.competition import Block, joined, packed, scores
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.evidence import make_evidence
 from aqualog.diagnose.hypotheses import hypotheses
@@ -81,10 +81,10 @@ def test_evidence_is_that_of_the_dense_normal_distribution():
         return -0.5 * np.linalg.slogdet(S)[1] - 0.5 * y @ np.linalg.solve(S, y) + 0.5 * y @ y
 
     each = np.array([dense(x[:3], s) for s in (1.0, 3.0)])
-    gained, scale = scored(start(inner), block)
+    gained, scale = (float(x[0]) for x in scores(inner, packed([block])[0]))
     assert gained == pytest.approx(float(np.log(np.mean(np.exp(each)))), rel=1e-9)
-    state = added(start(inner), 0, block)
-    assert state.evidence == pytest.approx(gained - 2.0)
+    state = joined(inner, [block], [0])
+    assert (state.evidence, state.scales) == (pytest.approx(gained - 2.0), (scale,))
     S = np.eye(40) + scale**2 * x[:3].T @ P @ x[:3]
     np.testing.assert_allclose(
         state.inner[3:, 3:], np.array([x[3], x[4], y]) @ np.linalg.solve(S, np.array([x[3], x[4], y]).T)

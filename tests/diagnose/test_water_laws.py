@@ -168,11 +168,11 @@ def test_one_effect_of_water_more_has_only_its_own_evidence():
     best, other = (by_key["contact_loss"],), (by_key["water_drag"],)
     both, axles = (tuple(sorted(x)) for x in (best + other, (by_key["contact_loss@f"], by_key["contact_loss@r"])))
     options = {m: Option(m, e) for m, e in (((), -5.0), (best, 20.0), (other, 12.0), (both, 16.0), (axles, 16.0))}
-    levelled = {o.members: o.evidence for o in _levelled(b, arena, options, best, set(), Model())}
+    levelled = {o.members: o.evidence for o in _levelled(b, arena, options, best, set())}
     more = pytest.approx(16.0 - STRUCTURE * 20.0)  # a second effect explains more than a simulator's errors
     assert levelled == {(): -5.0, best: 20.0, other: pytest.approx(12.0 + FORM * 20.0), both: more, axles: more}
     options = {m: Option(m, -5.0) for m in (best, both)}
-    assert {o.evidence for o in _levelled(b, arena, options, best, set(), Model())} == {-5.0}  # no gain, no share of it
+    assert {o.evidence for o in _levelled(b, arena, options, best, set())} == {-5.0}  # no gain, no share of it
 
 
 def test_the_files_own_water_is_judged_by_the_simulator():
@@ -193,7 +193,7 @@ def test_a_sharper_refit_that_fits_worse_is_left(monkeypatch):
     i = next(i for i, x in enumerate(arena.blocks) if x.key == "contact_loss")
     measure = metric(arena, posterior.weighings)
     own = refit(b, [arena.blocks[i].tag], np.zeros(1), measure, Model())
-    worse = replace(own, values=own.values + 0.5, residuals=tuple(3.0 * r for r in own.residuals))
+    worse = replace(own, values=own.values + 0.5, off=own.off + 0.5, residuals=tuple(3.0 * r for r in own.residuals))
     monkeypatch.setattr(search, "refit", lambda *_: worse)
     found = Found(None, None, None, arena, posterior)
     assert sharpened(found, Option((i,), 0.0, own), Model())[0] is own

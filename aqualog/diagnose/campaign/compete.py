@@ -16,7 +16,7 @@ from aqualog.diagnose.campaign.noise import Fit, fit, inner
 from aqualog.diagnose.campaign.passes import RESISTANCE, Passes
 from aqualog.diagnose.campaign.refit import Refit, refit
 from aqualog.diagnose.compete import rule
-from aqualog.diagnose.competition import COARSE, Block, added, start
+from aqualog.diagnose.competition import COARSE, Block, joined, placed
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.records import Remainder, Significance
@@ -197,13 +197,9 @@ def _options(ring: _Ring, stand: _Stand, nothing: Refit) -> tuple[Option, ...]:
 
 def _evidence(ring: _Ring, stand: _Stand, found: Refit, members: Members) -> float:
     """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values."""
-    state = start(inner(found.x, found.at_start, ring.passes.nuisances, stand.scatter.weight))
-    cost, at = float(state.inner[-1, -1]), 0
-    for m in members:
-        b = ring.known[m]
-        state = added(state, m, replace(b, columns=tuple(range(at, at + len(b.columns)))))
-        at += len(b.columns)
-    return state.evidence - 0.5 * cost
+    gram = inner(found.x, found.at_start, ring.passes.nuisances, stand.scatter.weight)
+    state = joined(gram, placed([ring.known[m] for m in members]), range(len(members)))
+    return state.evidence - 0.5 * float(gram[-1, -1])
 
 
 def _shapes_of(passes: Passes) -> tuple[tuple[Shape, ...], FloatArray]:
