@@ -30,25 +30,23 @@ FARTHEST_S = 1.0  # [s] of a jump to either side
 ALIKE = 0.7  # correlation that a window needs: less shows no delay
 LEAST_MOTION = 0.05  # [m/s²] rms in a window
 LEAST_WINDOWS = 12
-SIDE, AROUND = 4, 8  # windows before and after a step; among how many its place is looked for
+SIDE = 4  # windows before and after a step
 LEAST_S = 0.05  # [s] smallest step that counts as a jump: the tyre's own delay changes by 0.04 with the driving
 LEAST_SAMPLES = 0.75
-DRAWS, TOGETHER = 199, 3  # permutations, and neighbours that stay together in them
-CLIP = 3.0  # [sd] of a window's delay
-UNSURE = 20.0  # usual misfits of a block that a place may cost
+DRAWS = 199  # permutations
 NEAR_S = 5.0 * WINDOW_S  # [s] within which steps of several pairs are one seam
 
 
 @dataclass(frozen=True, slots=True)
 class Seam:
-    """A jump of a signal's clock at `t` [s]: from there on it comes `size` [s] later; earlier if negative.
+    """A jump of a signal's clock at `t` [s], known to a window: from there on it comes `size` [s] later; earlier if
+    negative.
 
-    `between` [s]: first and last likely time; where the car does not accelerate, no delay shows. `signals`: the one
-    that jumps; two where no third one shows which. `p_value`: of such a step by chance anywhere in the drive.
+    `signals`: the one that jumps; two where no third one shows which. `p_value`: of such a step by chance anywhere in
+    the drive.
     """
 
     t: float
-    between: tuple[float, float]
     size: float
     signals: tuple[str, ...]
     p_value: float
@@ -62,26 +60,17 @@ class Seam:
 
 
 class _Delays(NamedTuple):
-    """Delay of one source against another by window: middle [s], delay [s], weight, and 1 / speed [s/m].
-
-    `misfit` (b, L): squared difference in blocks of `block_s`, by `lags` [s]; `least`: smallest step [s].
-    """
+    """Delay of one source against another by window: middle [s], delay [s], weight; `least`: smallest step [s]."""
 
     t: FloatArray
     delay: FloatArray
     weight: FloatArray
-    slowness: FloatArray
-    block_s: float
-    lags: FloatArray
-    misfit: FloatArray
     least: float = LEAST_S
 
 
 class _Step(NamedTuple):
     pair: tuple[str, str]
     t: float
-    first: float
-    last: float
     size: float
     p: float
 
@@ -94,11 +83,10 @@ def seams(signals: Signals, vehicle: Vehicle, *, seed: int = 1) -> tuple[Seam, .
     without acceleration there is nothing to see.
     """
     sources = _sources(signals, vehicle)
-    slowness = _slowness(signals, vehicle)
     pairs = list(combinations(sources, 2))
     steps: list[_Step] = []
     for i, (a, b) in enumerate(pairs):
-        delays = _delays(sources[a], sources[b], slowness, max(1, round(STEP_S / signals.dt)) * signals.dt)
+        delays = _delays(sources[a], sources[b], max(1, round(STEP_S / signals.dt)) * signals.dt)
         if delays is not None:
             # half a sample of a slow bus is no jump
             rates = [o.rate_hz for n, o in signals.origins.items() if n.split("_")[0] in (a, b) or n in (a, b)]
@@ -128,14 +116,6 @@ def _sources(signals: Signals, vehicle: Vehicle) -> dict[str, FloatArray]:
     return out
 
 
-def _slowness(signals: Signals, vehicle: Vehicle) -> FloatArray:
-    """1 / speed (m,) [s/m] at the steps of the comparison."""
-    names = [f"omega_{w}" for w in WHEELS if f"omega_{w}" in signals.symbols]
-    speeds = [signals.array(n) * vehicle.r_e(n[-2:]) for n in names] or [signals.array("v_x")]
-    v = np.nan_to_num(np.abs(speeds[0]), nan=10.0)
-    return np.asarray(1.0 / np.maximum(v, 2.0))[:: max(1, round(STEP_S / signals.dt))]
-
-
 def _band(x: FloatArray, dt: float, *, is_speed: bool) -> FloatArray:
     good = np.isfinite(x)
     filled = np.interp(np.arange(x.size), np.flatnonzero(good), x[good])
@@ -150,7 +130,7 @@ def _band(x: FloatArray, dt: float, *, is_speed: bool) -> FloatArray:
     return np.where(share > 0.5, out, np.nan)[::step]
 
 
-def _delays(x: FloatArray, y: FloatArray, slowness: FloatArray, dt: float) -> _Delays | None:
+def _delays(x: FloatArray, y: FloatArray, dt: float) -> _Delays | None:
     """By how much x comes later than y, window by window, around their delay in the whole drive."""
     reach = round(FARTHEST_S / dt)
     good = np.isfinite(x) & np.isfinite(y)
@@ -182,11 +162,7 @@ def _delays(x: FloatArray, y: FloatArray, slowness: FloatArray, dt: float) -> _D
         return None
     delay = (shifts[i] + 0.5 * (right - left) / curve) * dt
     weight = curve / np.maximum(1.0 - top**2, 1e-3)
-    gain = float(sums[0].sum(axis=0).max() / sums[1][:, reach].sum())
-    misfit = xx[:, None] - 2.0 * gain * xy + gain**2 * yy
-    weight = np.minimum(weight[used], 4.0 * float(np.median(weight[used])))
-    slow = slowness[: m * per * size].reshape(m, -1).mean(axis=1)[used]
-    return _Delays((row[used] + 0.5) * per * block_s, delay[used], weight, slow, block_s, shifts * dt, misfit)
+    return _Delays((row[used] + 0.5) * per * block_s, delay[used], weight[used])
 
 
 def _products(
@@ -209,55 +185,33 @@ def _steps(pair: tuple[str, str], d: _Delays, tests: int, rng: np.random.Generat
     """Steps of the delay of one pair: the surest, then those before and after it."""
     if d.t.size < LEAST_WINDOWS or depth > 2:
         return []
-    gains, sizes = _scan(d, _clipped(d)[None])
+    gains, sizes = _scan(d, d.delay[None])
     at = int(np.argmax(gains[0]))
     size = float(sizes[0, at])
-    found: list[_Step] = []
     if abs(size) < d.least:
-        return found
-    # without the step, delays of neighbours stay together: a driver brakes more than once
-    rest = _clipped(d) - size * (np.arange(d.t.size) > at + SIDE - 1)
-    drawn = np.array([rest[_shuffled(d.t.size, rng)] for _ in range(DRAWS)])
+        return []
+    rest = d.delay - size * (np.arange(d.t.size) > at + SIDE - 1)
+    drawn = np.array([rng.permutation(rest) for _ in range(DRAWS)])
     maxima = _scan(d, drawn)[0].max(axis=1)
     p = min(1.0, gumbel_p(maxima, float(gains[0, at])) * tests) if gains[0, at] > maxima.max() else 1.0
-    if p > SEAM_LEVEL:
-        return found
     k = at + SIDE
-    before, after = (float(np.median(x)) for x in (d.delay[:k], d.delay[k:]))
-    if abs(after - before) < d.least:
-        return found
-    place = _placed(d, before, after, float(d.t[max(k - AROUND, 0)]), float(d.t[min(k + AROUND, d.t.size) - 1]))
-    found.append(_Step(pair, *place, after - before, p))
+    size = float(np.median(d.delay[k:]) - np.median(d.delay[:k]))
+    if p > SEAM_LEVEL or abs(size) < d.least:
+        return []
+    found = [_Step(pair, 0.5 * float(d.t[k - 1] + d.t[k]), size, p)]
     for part in (slice(0, k), slice(k, None)):
-        half = d._replace(
-            t=d.t[part], delay=d.delay[part], weight=d.weight[part], slowness=d.slowness[part]
-        )  # fmt: skip
+        half = d._replace(t=d.t[part], delay=d.delay[part], weight=d.weight[part])
         found += _steps(pair, half, tests, rng, depth + 1)
     return found
-
-
-def _clipped(d: _Delays) -> FloatArray:
-    """Delays without wild ones: each within some deviations of its neighbours' median."""
-    padded = np.pad(d.delay, 3, mode="edge")
-    middle = np.median(np.lib.stride_tricks.sliding_window_view(padded, 7), axis=1)
-    sd = max(1.4826 * float(np.median(np.abs(d.delay - middle))), 1e-3)
-    return np.asarray(np.clip(d.delay, middle - CLIP * sd, middle + CLIP * sd))
-
-
-def _shuffled(n: int, rng: np.random.Generator) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    start = int(rng.integers(TOGETHER))
-    groups = np.split(np.arange(n), np.arange(start, n, TOGETHER)[1 if start == 0 else 0 :])
-    return np.concatenate([groups[i] for i in rng.permutation(len(groups))])
 
 
 def _scan(d: _Delays, delays: FloatArray) -> tuple[FloatArray, FloatArray]:
     """F-type gain of a step beside what is no step, for series (s, m) and all places: gains and sizes (s, places).
 
-    No step are a level, a ramp (a clock that drifts), and a tyre's delay, which falls with the speed.
+    No step are a level and a ramp (a clock that drifts).
     """
     t, w = d.t, np.sqrt(d.weight)
-    beside = [(x - x.mean()) / max(float(np.ptp(x)), 1e-9) for x in (t, d.slowness)]
-    base, _ = np.linalg.qr(np.stack([w, *(w * x for x in beside)], axis=1))
+    base, _ = np.linalg.qr(np.stack([w, w * (t - t.mean()) / max(float(np.ptp(t)), 1e-9)], axis=1))
     y = delays * w
     y = y - (y @ base) @ base.T
     places = np.arange(SIDE, t.size - SIDE + 1)
@@ -270,37 +224,19 @@ def _scan(d: _Delays, delays: FloatArray) -> tuple[FloatArray, FloatArray]:
     return gain / left * (t.size - 4), along / energy
 
 
-def _placed(d: _Delays, before: float, after: float, start: float, end: float) -> tuple[float, float, float]:
-    """Where the misfit with the one delay becomes larger than with the other; first and last possible place. [s]"""
-    a, b = (int(np.argmin(np.abs(d.lags - x))) for x in (before, after))
-    first, last = int(start / d.block_s), int(end / d.block_s)
-    misfit = d.misfit[first:last]
-    if not misfit.size:
-        return 0.5 * (start + end), start, end
-    change = np.cumsum(misfit[:, a] - misfit[:, b])
-    best = int(np.argmin(change))
-    usual = float(np.median(np.minimum(misfit[:, a], misfit[:, b])))
-    near = np.flatnonzero(change <= change[best] + UNSURE * usual)
-    return tuple((first + 1 + int(i)) * d.block_s for i in (best, near[0], near[-1]))  # type: ignore[return-value]
-
-
 def _named(steps: Sequence[_Step], sources: Sequence[str]) -> list[Seam]:
     """Steps of pairs as jumps of sources: the source that is in most of the pairs that step at one time."""
     out = []
     left = sorted(steps, key=lambda s: s.p)
     while left:
         surest = left[0]
-        group = [
-            s for s in left
-            if s.first <= surest.last + NEAR_S and s.last >= surest.first - NEAR_S and set(s.pair) & set(surest.pair)
-        ]  # fmt: skip
+        group = [s for s in left if abs(s.t - surest.t) <= NEAR_S and set(s.pair) & set(surest.pair)]
         score = {s: sum(s in step.pair for step in group) for s in sources}
         names = tuple(s for s in sources if score[s] == max(score.values()))
         if len(names) > 1:
             names, group = surest.pair, [surest]
         own = [s for s in group if names[0] in s.pair]
         size = float(np.median([s.size * (1.0 if s.pair[0] == names[0] else -1.0) for s in own]))
-        placed = min(own, key=lambda s: s.last - s.first)
-        out.append(Seam(placed.t, (placed.first, placed.last), size, names, surest.p))
+        out.append(Seam(float(np.median([s.t for s in own])), size, names, surest.p))
         left = [s for s in left if s not in group]
     return out

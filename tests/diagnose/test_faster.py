@@ -57,7 +57,7 @@ def test_without_wheel_speeds_or_with_slow_ones_it_is_untested(few, monkeypatch)
 
 
 def test_seams_are_notes(few, monkeypatch):
-    one = Seam(81.3, (80.0, 83.0), -0.25, ("v_x",), 1e-6)
+    one = Seam(81.3, -0.25, ("v_x",), 1e-6)
     monkeypatch.setattr(faster, "seams", lambda *_, **__: (one,))
     d = told()
     assert d.verdict == "no_effect"

@@ -59,7 +59,6 @@ def test_a_jump_is_found_with_time_size_and_signal(source, at, size):
     found = seams(drive(**{source: {"jump": (at, size)}}), CAR)
     assert [f.signals for f in found] == [(source,)]
     assert found[0].t == pytest.approx(at, abs=6.0)
-    assert found[0].between[0] - 1.0 <= at <= found[0].between[1] + 1.0
     assert found[0].size == pytest.approx(size, abs=0.02)
     assert found[0].p_value < 0.01
 
@@ -106,10 +105,7 @@ def test_gaps_do_not_matter():
 
 
 def test_sentence():
-    assert (
-        Seam(81.3, (80.0, 83.0), -0.25, ("v_x",), 1e-6).sentence
-        == "From 81 s on, v_x comes 0.25 s earlier: a seam of the log."
-    )
+    assert Seam(81.3, -0.25, ("v_x",), 1e-6).sentence == "From 81 s on, v_x comes 0.25 s earlier: a seam of the log."
 
 
 def test_cost():
