@@ -20,7 +20,6 @@ __all__ = [
 # draws of noise: on 200 made drives without effect of 40 s, the level 0.05 was passed by 0.115 with 19, 0.080 with 49
 # and 0.045 with 199 (D); Gumbel's distribution of few maxima has too short a tail
 SURROGATES = 499
-SINGULAR = 1e-3  # share of a column's energy that the others of its hypothesis must leave
 ALIKE = 0.97  # cosine of whitened signatures from which one stands for both
 EULER = 0.5772156649015329
 

@@ -28,7 +28,7 @@ from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
 
 __all__ = [
-    "CHUNK", "SHAPE_PRIOR", "Arena", "Part", "arena_of", "blocks_of", "known_only", "make_arena", "products",
+    "CHUNK", "SHAPE_PRIOR", "Arena", "Field", "Part", "arena_of", "blocks_of", "known_only", "make_arena", "products",
     "unit_force",
 ]  # fmt: skip
 
@@ -56,25 +56,14 @@ class Part:
 
 
 @dataclass(frozen=True, slots=True)
-class Arena:
-    """Blocks of columns. `sd` (K,) prior size of each column, by which it is scaled; `tolerance` (K, K) scaled
-    covariance of what cars and files differ by anyway; `rows` per part: where its samples are in the shapes' bases;
-    `forgiven`: blocks, such as a road, that are only in the tolerance.
-    """
+class Field:
+    """What competes on a drive or over a campaign: `blocks` of columns, which stand for effects or for `shapes`; `sd`
+    (K,) prior size of each column, by which it is scaled."""
 
     evidence: Evidence
-    parts: tuple[Part, ...]
-    rows: tuple[slice, ...]
-    shapes: tuple[Shape, ...]
     blocks: tuple[Block, ...]
     sd: FloatArray
-    tolerance: FloatArray
-    forgiven: tuple[Block, ...] = ()
-
-    @property
-    def width(self) -> int:
-        """Columns."""
-        return self.sd.size
+    shapes: tuple[Shape, ...]
 
     def name(self, block: int) -> str:
         """Name by which probabilities add up: the effect, or the mechanism of a shape with `()`."""
@@ -82,6 +71,22 @@ class Arena:
         if b.kind == "effect":
             return self.evidence.asked[b.tag].effect.name
         return f"{self.shapes[b.tag].mechanism.name}()"
+
+
+@dataclass(frozen=True, slots=True)
+class Arena(Field):
+    """What competes on drives. `tolerance` (K, K) scaled covariance of what cars and files differ by anyway; `rows`:
+    where each part's samples are in the shapes' bases; `forgiven`: blocks, such as a road, only in the tolerance."""
+
+    parts: tuple[Part, ...]
+    rows: tuple[slice, ...]
+    tolerance: FloatArray
+    forgiven: tuple[Block, ...] = ()
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+        return self.sd.size
 
     def drawn(self, part: int, block: Block) -> FloatArray:
         """Scaled columns (k, C, n) of a block along a part."""
@@ -196,7 +201,7 @@ def arena_of(evidence: Evidence, forces: Sequence[FloatArray]) -> Arena:
     ends = np.cumsum([0, *(p.mask.size for p in parts)])
     rows = tuple(slice(a, b) for a, b in pairwise(ends.tolist()))
     blocks, sd = blocks_of(evidence, made)
-    return Arena(evidence, tuple(parts), rows, made, blocks, sd, _tolerance(evidence, made, blocks, sd))
+    return Arena(evidence, blocks, sd, made, tuple(parts), rows, _tolerance(evidence, made, blocks, sd))
 
 
 def known_only(arena: Arena, roads: Sequence[Block]) -> Arena:

@@ -26,7 +26,7 @@ from aqualog.diagnose.faster import faster, joined, with_rings
 from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.grade import Profile, find_profile, with_profile
-from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, with_values
+from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
@@ -263,19 +263,10 @@ def _unnamed(outcome: Outcome[Option], found: Found, options: Options) -> tuple[
 def _extended(
     outcome: Outcome[Option], best: Refit | None, forms: Sequence[Remainder], model: Model, asked: Sequence[Hypothesis]
 ) -> Model:
-    extended = model
-    named = {c.key for c in outcome.causes}
-    if outcome.verdict == "unexplained":
-        extended = with_causes(model, [c for c in outcome.causes if c.key in {h.key for h in asked}], asked)
-    if best is not None:
-        # effects too small to be named are not put into the model either
-        extended = with_values(model, [
-            (h, {n: v for (i, n), v in zip(best.names, best.values.tolist(), strict=True) if best.members[i] is h})
-            for h in best.members
-            if h.key in named
-        ])  # fmt: skip
-    terms = [as_term(r) for r in forms]
-    for term in terms:
+    """The model with the named effects of the best set, or those beside an unknown form, and with the forms."""
+    own = asked if outcome.verdict == "unexplained" else best.members if best is not None else ()
+    extended = with_causes(model, outcome.causes, own)
+    for term in map(as_term, forms):
         if term is not None and all(t.effect is not term.effect for t in extended.terms):
             extended = extended.with_term(term)
     return extended

@@ -5,22 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.any_effect import ALIKE as SAME
-from aqualog.diagnose.arena import Arena
+from aqualog.diagnose.arena import Arena, Field
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.compete import Fitted, Posterior, fitted
 from aqualog.diagnose.competition import Block
 from aqualog.diagnose.records import SURE, Remainder, tempered
 from aqualog.diagnose.sets import Sets, evidence_of
-from aqualog.diagnose.shapes import Shape
 from aqualog.diagnose.unknown_term import describe
 
-__all__ = ["Clear", "Field", "clear_forms", "described", "unknown_forms"]
+__all__ = ["Clear", "clear_forms", "described", "unknown_forms"]
 
 AHEAD = 3.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
@@ -29,25 +28,6 @@ LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what it explains, by t
 NOTABLE = 0.05  # probability from which another coordinate is mentioned
 ALIKE = 0.2  # share of the best coordinate's probability from which the drive cannot distinguish another
 DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points together
-
-
-class Field(Protocol):
-    """What competes: blocks, the shapes that some of them are, and the prior size of each column."""
-
-    @property
-    def blocks(self) -> tuple[Block, ...]:
-        """Of known effects and of shapes."""
-
-    @property
-    def shapes(self) -> tuple[Shape, ...]:
-        """Of the blocks' tags."""
-
-    @property
-    def sd(self) -> FloatArray:
-        """By which columns are scaled."""
-
-    def name(self, block: int) -> str:
-        """Name by which probabilities add up."""
 
 
 class Clear(NamedTuple):

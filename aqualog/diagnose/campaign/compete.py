@@ -10,7 +10,7 @@ import numpy as np
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.any_effect import Calibration, calibrate, significance
-from aqualog.diagnose.arena import blocks_of
+from aqualog.diagnose.arena import Field, blocks_of
 from aqualog.diagnose.campaign.catalogue import Library, library
 from aqualog.diagnose.campaign.noise import Fit, fit, inner
 from aqualog.diagnose.campaign.passes import RESISTANCE, Passes
@@ -62,22 +62,12 @@ class Found(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class _Ring:
+class _Ring(Field):
     """What competes in these runs; `functions` (g, c, K): columns of the shapes, after those of the effects."""
 
+    functions: FloatArray
     passes: Passes
     given: Model
-    evidence: Evidence
-    blocks: tuple[Block, ...]
-    sd: FloatArray
-    shapes: tuple[Shape, ...]
-    functions: FloatArray
-
-    def name(self, block: int) -> str:
-        b = self.blocks[block]
-        return (
-            self.evidence.asked[b.tag].effect.name if b.kind == "effect" else f"{self.shapes[b.tag].mechanism.name}()"
-        )
 
     @property
     def known(self) -> tuple[Block, ...]:
@@ -113,7 +103,7 @@ def compete(
     say("signatures of the effects")
     lib = library(passes, given, asked, given)
     shapes, functions = _shapes_of(passes)
-    ring = _Ring(passes, given, lib.evidence, *blocks_of(lib.evidence, shapes), shapes, functions)
+    ring = _Ring(lib.evidence, *blocks_of(lib.evidence, shapes), shapes, functions, passes, given)
     y = passes.values - lib.base
     nothing = Refit((), np.zeros(0), given, y, np.zeros((*y.shape, 0)), at_bound=False)
     stand = _Stand(nothing, lib, y, fit(y, lib.x, lib.road, passes.nuisances))

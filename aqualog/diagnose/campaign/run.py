@@ -17,7 +17,7 @@ from aqualog.diagnose.campaign.observe import passes_of
 from aqualog.diagnose.campaign.outcome import conclude
 from aqualog.diagnose.campaign.passes import RESISTANCE, Passes, doubted, steady
 from aqualog.diagnose.campaign.refit import settled
-from aqualog.diagnose.hypotheses import with_values
+from aqualog.diagnose.outcome import with_causes
 from aqualog.diagnose.records import Diagnosis, Gain, ResidualView
 from aqualog.diagnose.run import Options
 from aqualog.diagnose.unknown_term import short_form
@@ -89,7 +89,7 @@ def _diagnosed(
         d.verdict, d.causes, level=level, reason=reason, certain=d.certain,
         seen=p if p <= level else None, source="campaign",
     )  # fmt: skip
-    given, named = found.nothing.model, {x.key: x for x in d.causes}
+    given = found.nothing.model
     before, then = (settled(r, passes, found.scatter.weight) for r in (found.nothing, after))
     return Diagnosis(
         verdict=d.verdict,
@@ -105,11 +105,7 @@ def _diagnosed(
         remainders=found.forms,
         manoeuvre=advice(passes, [s.option for s, _ in d.rivals], found.scatter),
         gain=won,
-        # effects too small to be named are not put into the model either
-        model=with_values(
-            given,
-            [(h, {n: e.value for n, e in named[h.key].parameters.items()}) for h in after.members if h.key in named],
-        ),
+        model=with_causes(given, d.causes, after.members),
         channels=tuple(n for n in passes.names if not n.startswith("dry_")),
         untested=untested(evidence.asked),
         notes=(*_notes(passes), *d.notes),
