@@ -71,7 +71,7 @@ class _Wheel(NamedTuple):
     """A wheel speed at its own step: mean and relative rest (m,), weight 1 / variance of the rest, angle [turns].
 
     `rate` [Hz]: at which the bus has it; `lines`: time between samples that straight lines connect, else 0. [s]
-    `between`: as in `Origin`; `rounding` (m,): share of that variance that comes from the steps of the signal.
+    `between`: as in `Origin`.
     """
 
     dt: float
@@ -82,20 +82,18 @@ class _Wheel(NamedTuple):
     rest: FloatArray
     weight: FloatArray
     turns: FloatArray
-    rounding: FloatArray
 
 
 class _Sum(NamedTuple):
     """Sums over blocks of turns: weight (b,), transforms (b, j) at the orders `offset` (j,) beside the whole one.
 
-    `speed` (b,): mean [rad/s]; `rounding`: noise that the steps of the signal would make, in units of `weight`.
+    `speed` (b,): mean [rad/s].
     """
 
     weight: FloatArray
     transform: np.ndarray[tuple[int, int], np.dtype[np.complex128]]
     offset: FloatArray
     speed: FloatArray
-    rounding: float
     finer: int
 
 
@@ -171,14 +169,13 @@ def _prepared(x: FloatArray, dt: float, origin: Origin | None) -> _Wheel | str:
     good &= np.abs(filled - mean) <= OUTLIER * np.maximum(scatter, step)
     filled = np.where(good | missing, filled, mean)  # outliers would turn the angle
     mean = smooth(filled, dt, SPEED_S)
-    rounding = step**2 / 12.0
-    variance = np.maximum(_scatter(filled - mean, dt) ** 2, max(rounding, 1e-12))
+    variance = np.maximum(_scatter(filled - mean, dt) ** 2, max(step**2 / 12.0, 1e-12))
     turns = np.concatenate(([0.0], np.cumsum(0.5 * dt * (filled[1:] + filled[:-1])))) / (2.0 * math.pi)
     safe = np.maximum(mean, 1e-3)
     beside = round(0.5 * SPEED_S / dt)
     edge = np.convolve(np.pad(missing, beside, constant_values=True), np.ones(2 * beside + 1), "valid") > 0.5
     weight = np.where(good & ~edge & (mean > 1e-3), safe**2 / variance, 0.0)
-    return _Wheel(dt, rate, lines, between, mean, (filled - mean) / safe, weight, turns, rounding / variance)
+    return _Wheel(dt, rate, lines, between, mean, (filled - mean) / safe, weight, turns)
 
 
 def _tested(wheel: _Wheel, order: int, slack: float) -> PerTurn | str:
@@ -190,9 +187,8 @@ def _tested(wheel: _Wheel, order: int, slack: float) -> PerTurn | str:
         return f"wheel speeds at {wheel.rate:.3g} Hz are too slow for one turn of a wheel at the speeds of the drive"
     part = _Wheel(wheel.dt, wheel.rate, wheel.lines, wheel.between, *(a[used] for a in wheel[4:]))
     f = f[used]
-    # share of the amplitude that is left: no window or the whole period of the reports, and what the mean took and the
-    # lines between samples
-    most = (1.0 - _hann_gain(f, wheel.dt)) * np.sinc(f * wheel.lines) ** 2
+    # share of the amplitude that is left: no window or the whole period of the reports, and lines between samples
+    most = np.sinc(f * wheel.lines) ** 2
     if wheel.lines == 0.0:
         most *= np.sqrt(1.0 - 2.0 * wheel.between * (1.0 - np.cos(2.0 * np.pi * f * wheel.dt)))
     least = most * np.sinc(f * max(1.0 / wheel.rate, wheel.dt))
@@ -255,16 +251,13 @@ def _summed(
     bins = np.bincount(place_of, z.real, size) + 1j * np.bincount(place_of, z.imag, size)
     block = place_of // (BINS * length)
     weight = np.bincount(block, w * gain, blocks)
-    rounding = np.bincount(block, w * gain * part.rounding, blocks)
     speed = np.bincount(block, w * gain * part.mean, blocks)
     k = math.ceil((NULL + order * ORDER_SLACK) * length * finer) + 1
     transform = np.fft.fft(bins.reshape(blocks, length * BINS), length * BINS * finer, axis=1)
     near = np.concatenate([transform[:, -k:], transform[:, : k + 1]], axis=1)
     full = weight > 0.02 * weight.max()
-    step = float(rounding[full].sum() / weight[full].sum())
-    return _Sum(
-        weight[full], near[full], np.arange(-k, k + 1) / (length * finer), speed[full] / weight[full], step, finer
-    )
+    offset = np.arange(-k, k + 1) / (length * finer)
+    return _Sum(weight[full], near[full], offset, speed[full] / weight[full], finer)
 
 
 def _fitted(sums: _Sum, slack: float) -> _Fit | None:
@@ -277,7 +270,7 @@ def _fitted(sums: _Sum, slack: float) -> _Fit | None:
     null = beside.sum(axis=0)
     if null.size < 4:
         return None
-    noise = max(float(null.mean()) / count, sums.rounding)
+    noise = float(null.mean()) / count
     # unequal noise of the blocks: fewer degrees of freedom than their number
     wider = max(1.0, 0.5 * float((beside**2).mean()) / max(float(beside.mean()), 1e-300) ** 2)
     at = np.flatnonzero(off <= slack + 1e-9)
@@ -352,14 +345,3 @@ def _step(x: FloatArray) -> float:
     change = np.abs(np.diff(x))
     change = change[np.isfinite(change) & (change > 1e-9)]
     return float(np.quantile(change, 0.01)) if change.size else 0.0
-
-
-def _hann_gain(f: FloatArray, dt: float) -> FloatArray:
-    """Gain of the mean over a second at frequencies (m,) [Hz], as `smooth` takes it."""
-    k = round(SPEED_S / dt) | 1
-    window = np.hanning(k + 2)[1:-1]
-    window /= window.sum()
-    grid = np.linspace(0.0, 0.5 / dt, 400)
-    at = (np.arange(k) - k // 2) * dt
-    gain = np.cos(2.0 * math.pi * np.outer(grid, at)) @ window
-    return np.asarray(np.interp(f, grid, gain))
