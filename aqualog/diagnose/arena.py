@@ -16,7 +16,7 @@ import numpy.typing as npt
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import block_step, contrasts
-from aqualog.diagnose.competition import Block, placed
+from aqualog.diagnose.competition import Block
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.evidence import Evidence, forgiving
 from aqualog.diagnose.hypotheses import residual
@@ -76,12 +76,11 @@ class Field:
 @dataclass(frozen=True, slots=True)
 class Arena(Field):
     """What competes on drives. `tolerance` (K, K) scaled covariance of what cars and files differ by anyway; `rows`:
-    where each part's samples are in the shapes' bases; `forgiven`: blocks, such as a road, only in the tolerance."""
+    where each part's samples are in the shapes' bases."""
 
     parts: tuple[Part, ...]
     rows: tuple[slice, ...]
     tolerance: FloatArray
-    forgiven: tuple[Block, ...] = ()
 
     @property
     def width(self) -> int:
@@ -120,7 +119,7 @@ class Arena(Field):
         rows = np.empty((self.width + 1, width), dtype=np.float32)
         rows[:k] = turned(p.signatures)
         rows[:k] *= self.sd[:k, None].astype(np.float32)
-        for b in (*self.blocks, *self.forgiven):
+        for b in self.blocks:
             if b.kind != "effect":
                 rows[list(b.columns)] = turned(self.drawn(part, b))
         rows[-1] = turned(p.residual[None])[0]
@@ -137,7 +136,7 @@ class Arena(Field):
         used = np.flatnonzero(scaled[:, :k].any(axis=0))
         out = np.tensordot(scaled[:, used], p.signatures[used], axes=1)
         by_source: dict[str, FloatArray] = {}
-        for b in (*self.blocks, *self.forgiven):
+        for b in self.blocks:
             v = scaled[:, list(b.columns)]
             if b.kind != "effect" and np.any(v):
                 s = self.shapes[b.tag]
@@ -204,21 +203,15 @@ def arena_of(evidence: Evidence, forces: Sequence[FloatArray]) -> Arena:
     return Arena(evidence, blocks, sd, made, tuple(parts), rows, _tolerance(evidence, made, blocks, sd))
 
 
-def known_only(arena: Arena, roads: Sequence[Block]) -> Arena:
-    """The arena without unknown shapes and without the tolerances along coordinates; `roads` are marginalised.
+def known_only(arena: Arena) -> Arena:
+    """The arena without unknown shapes and without the tolerances along coordinates.
 
     Those tolerances forgive a drag or a slip slope that is off by several of its own. Whether a form is unknown must
     not depend on them; which known effect it is may be judged more sharply.
     """
     k = arena.evidence.count
     blocks = tuple(b for b in arena.blocks if b.kind == "effect")
-    own = [*range(k), *(c for b in roads for c in b.columns)]
-    tolerance = np.zeros((len(own), len(own)))
-    tolerance[:k, :k] = arena.tolerance[:k, :k]
-    forgiven = placed(roads, k)
-    for b in forgiven:
-        tolerance[np.ix_(b.columns, b.columns)] = b.prior
-    return replace(arena, blocks=blocks, sd=arena.sd[own], tolerance=tolerance, forgiven=tuple(forgiven))
+    return replace(arena, blocks=blocks, sd=arena.sd[:k], tolerance=arena.tolerance[:k, :k])
 
 
 def _stretches(drives: Sequence[Drive]) -> list[tuple[int, slice]]:
@@ -244,7 +237,7 @@ def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, .
     sd = [evidence.prior]
     out = []
     for i, (h, columns) in enumerate(zip(evidence.asked, evidence.columns, strict=True)):
-        if h.allowed or evidence.barred[i]:
+        if h.allowed:
             continue
         c = list(columns)
         moments = MOMENTS if h.effect.drive.begins_like and "start" in h.fixed and len(evidence.drives) == 1 else 1

@@ -96,8 +96,7 @@ def _options(
         often = times if isinstance(w, Run) else (1,)
         return [_Option(w, n, forecast(case, log, added, n, group), sensor) for n in often]
 
-    # a single one has both threads for itself
-    return list(chain.from_iterable(beside(one, what) if len(what) > 1 else map(one, what)))
+    return list(chain.from_iterable(beside(one, what)))
 
 
 def _confirmed(case: Case, options: Sequence[_Option], group: FloatArray) -> _Option:

@@ -90,7 +90,7 @@ def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) ->
         # with fewer tolerances a value may fall below what is worth naming
         return kept if kept.names == s.names else replace(s, sharp=loss)
 
-    sharp = beside(sharper, near) if len(near) > 1 else [sharper(near[0])]
+    sharp = beside(sharper, near)
     best = min(s.sharp for s in sharp)
     as_good = [s for s in sharp if COARSE * (s.sharp - best) < 2.0 * math.log(PLACES)]
     return max(as_good, key=lambda s: (whole(s), s.share))

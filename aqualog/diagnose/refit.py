@@ -107,8 +107,6 @@ def metric(
     The columns `beside`, whose values are estimated, are an exception, and so is every effect that looks the same.
     Their spread is not part of the metric; it is added to the variance of the estimated values (`Metric.apart`). Both
     ways agree as long as a signature does not change with its value (D). Only the second stays right if it does.
-
-    What the arena forgives, such as a road, is marginalised with its prior.
     """
     evidence = arena.evidence
     apart = np.zeros(evidence.count)
@@ -121,10 +119,8 @@ def metric(
     sd = np.maximum(shares * evidence.tolerance, known)
     k = np.flatnonzero(sd > 0.0)
     pieces = []
-    for i, (p, w) in enumerate(zip(arena.parts, weighings, strict=True)):
-        columns = [p.signatures[k] * sd[k, None, None]]
-        columns += [np.tensordot(np.linalg.cholesky(b.prior).T, arena.drawn(i, b), axes=1) for b in arena.forgiven]
-        pieces.append(w.rows(np.concatenate(columns), np.float32))
+    for p, w in zip(arena.parts, weighings, strict=True):
+        pieces.append(w.rows(p.signatures[k] * sd[k, None, None], np.float32))
     A = np.concatenate(pieces, axis=1) if len(pieces) > 1 else pieces[0]
     A *= np.float32(math.sqrt(coarse))
     M = np.asarray(np.linalg.inv(np.eye(len(A)) + products(A)))

@@ -46,7 +46,6 @@ NEAR = 10.0  # [nats] behind the best set, within which a single effect is refit
 DOUBT = 0.05
 # share of what a set explains, by which a simulator of other structure errs: one more effect has to explain more (K)
 STRUCTURE = 0.01
-HALF = 0.5  # probability from which a slope or bank of the road is marginalised
 UNUSUAL = 3.0  # of its prior's standard deviations, beyond which a value is not listed by a relation alone
 
 Tell = Callable[[str, float], None]
@@ -113,7 +112,7 @@ def search(
     tell("comparing known effects", 0.2)
     arena = make_arena(evidence, model)
     # a first answer for whom waits: a tenth of the time that the whole takes
-    first = known_only(arena, ())
+    first = known_only(arena)
     begun = begin(first)
 
     def look() -> Arena:
@@ -137,12 +136,7 @@ def search(
     tell(f"{so_far}; comparing known effects", 0.55)
     if test.p_value > level:
         return Found(test, gram, calibration, arena, posterior)
-    roads = [
-        b for i, b in enumerate(arena.blocks) if b.kind == "road" and posterior.blocks.get(i, 0.0) >= HALF
-    ]  # fmt: skip
-    arena = known_only(arena, roads) if roads else first
-    posterior = compete(arena, begun=None if roads else begun)
-    arena, posterior = _repeated(evidence, arena, posterior, model)
+    arena, posterior = _repeated(evidence, first, compete(first, begun=begun), model)
     tell(f"so far {_likeliest(arena, posterior)}; refitting in the simulator", 0.7)
     options = _refitted(evidence, arena, posterior, model)
     options = sorted(options, key=lambda o: -o.evidence)

@@ -73,7 +73,6 @@ MECHANISMS: tuple[Mechanism, ...] = (
         "lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.1,
         (("v_x",),),
     ),
-    Mechanism("road", "the slope of the road", "road_grade", "rad", 0.015, 0.0, (("position",),), is_road=True),
     Mechanism(
         "bank", "the bank of the road", "accelerometer_bias@a_y", "m/s^2", 0.2, 0.0, (("position",), ("t",)),
         is_road=True,
@@ -101,7 +100,7 @@ class Shape:
 
 def shapes(coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, has: Sequence[str]) -> tuple[Shape, ...]:
     """All shapes that a drive can show; `has`: the sources for which there are responses."""
-    made: dict[tuple[str, tuple[str, ...]], Basis | None] = {}
+    made: dict[tuple[str, ...], Basis | None] = {}
     out = []
     for m in MECHANISMS:
         if m.source not in has:
@@ -110,11 +109,9 @@ def shapes(coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, ha
             # over time and place a smooth function is no other than slow noise: see `elements`
             if not all(n in coordinates for n in names) or (not m.is_road and set(names) & set(ALONG)):
                 continue
-            is_fine = m.is_road and names == ("position",)
-            key = ("road" if is_fine else "", names)
-            if key not in made:
-                made[key] = basis(names, [coordinates[n] for n in names], mask, dt, is_road=is_fine)
-            found = made[key]
+            if names not in made:
+                made[names] = basis(names, [coordinates[n] for n in names], mask, dt)
+            found = made[names]
             if found is not None:
                 out.append(Shape(m, names, found))
     return tuple(out)

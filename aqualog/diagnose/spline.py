@@ -15,7 +15,6 @@ __all__ = ["Basis", "basis"]
 COLUMNS = 12  # of a coordinate: humps down to about a tenth of its range
 COLUMNS_TIME = 24  # of time: a step of 75 s in 300 s
 COLUMNS_PAIR = 6  # per coordinate
-ROAD_M, ROAD_MOST = 50.0, 160  # [m] between knots of a road, and the most of them
 LENGTH, LENGTH_TIME = 0.15, 0.08  # of the range over which a function may change
 FEW_VALUES = 8  # a coordinate with at most so many values gets one column for each
 TRIM = 0.004  # share of the samples beyond either end, where a spline would hang on single samples
@@ -58,13 +57,10 @@ class _Axis(NamedTuple):
         return np.asarray(np.exp(-0.5 * ((x[:, None] - x) / self.length) ** 2) + NUGGET * np.eye(x.size))
 
 
-def basis(
-    names: tuple[str, ...], z: Sequence[FloatArray], mask: BoolArray, dt: float, *, is_road: bool = False
-) -> Basis | None:
+def basis(names: tuple[str, ...], z: Sequence[FloatArray], mask: BoolArray, dt: float) -> Basis | None:
     """Functions of one or two coordinates (n,) [SI], NaN where unknown; None where the drive does not vary them.
 
-    The functions are zero where a coordinate is unknown. `mask` (n,): samples that count, at the step `dt` [s];
-    `is_road`: knots every 50 m.
+    The functions are zero where a coordinate is unknown. `mask` (n,): samples that count, at the step `dt` [s].
     """
     known = mask & np.isfinite(np.sum(z, axis=0))
     if np.count_nonzero(known) < max(LEAST_FINITE * np.count_nonzero(mask), 2):
@@ -72,16 +68,10 @@ def basis(
     if any(np.ptp(x[known]) <= 0.0 for x in z):
         return None
     along = names[0] in ("t", "position")
-    if is_road:
-        size = min(max(round(float(np.ptp(z[0][known])) / ROAD_M), 8), ROAD_MOST)
-        axes = [_axis(z[0][known], size, 1.5 / size)]
-    else:
-        size = COLUMNS_TIME if along else COLUMNS if len(z) == 1 else COLUMNS_PAIR
-        length = LENGTH_TIME if along else LENGTH if len(z) == 1 else 0.25
-        axes = [_axis(x[known], size, length) for x in z]
+    size = COLUMNS_TIME if along else COLUMNS if len(z) == 1 else COLUMNS_PAIR
+    length = LENGTH_TIME if along else LENGTH if len(z) == 1 else 0.25
+    axes = [_axis(x[known], size, length) for x in z]
     points = [_points(a, x[known], POINTS if len(z) == 1 else POINTS_PAIR) for a, x in zip(axes, z, strict=True)]
-    if is_road:
-        points = [np.linspace(axes[0].knots[0], axes[0].knots[-1], 2 * size)]
     if any(p.size < 2 for p in points):
         return None
     at = [_columns(a, x[known]) for a, x in zip(axes, z, strict=True)]

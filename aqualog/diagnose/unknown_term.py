@@ -14,11 +14,7 @@ from aqualog.model.term import Term
 
 __all__ = ["as_term", "describe", "short_form"]
 
-# mechanism and coordinates that the plant or the road has a table for
-_CARRIED: dict[tuple[str | None, tuple[str, ...]], str] = {
-    ("force", ("v_x",)): "unexplained_force",
-    ("road", ("position",)): "unexplained_grade",
-}
+_CARRIED = ("force", ("v_x",))  # mechanism and coordinate that the plant has a table for
 TAPER = 0.08  # of the range: beyond the driven range, the function falls to zero over this share
 ROUGH = 0.15  # of the band's half width: knots that change the function by less are left out
 SHORT_HOLE = 4  # points; a longer stretch without data is nominal
@@ -33,10 +29,9 @@ def as_term(remainder: Remainder) -> Term | None:
         The function within the driven range; outside it falls to zero over a short distance. None if
         the model has no table for this mechanism over these coordinates, or the function is beyond physical bounds.
     """
-    name = _CARRIED.get((remainder.mechanism, remainder.depends_on))
-    if name is None:
+    if (remainder.mechanism, remainder.depends_on) != _CARRIED:
         return None
-    effect = EMPIRICAL[name]
+    effect = EMPIRICAL["unexplained_force"]
     table = effect.table
     assert table is not None
     x, values = remainder.x[:, 0], remainder.f

@@ -29,7 +29,7 @@ def seen(car, asked, value, hidden):
     """Gain of the first effect, hidden with this value, in the test, its value and its standard deviation."""
     d = prepare(signals(hidden, sensors=NOISY), car, "a")
     evidence = simulated([d], asked, Model(), lambda _t, _s: None)
-    arena = known_only(arena_of(evidence, ()), ())
+    arena = known_only(arena_of(evidence, ()))
     without = [r - value * s[0] for r, s in zip(evidence.residuals, evidence.signatures, strict=True)]
     weighings = arena.weighed([[r] for r in without])
     gram = arena.tolerant(arena.inner(weighings))

@@ -25,7 +25,7 @@ def one(name, where=None):
 def prepared(asked, *terms, seed=3, model=Model()):  # noqa: B008 - frozen
     d = prepare(signals(*terms, sensors=NOISY, seed=seed), CAR, "a")
     evidence = simulated([d], asked, model, lambda _t, _s: None)
-    arena = known_only(arena_of(evidence, ()), ())
+    arena = known_only(arena_of(evidence, ()))
     posterior = compete(arena)
     members = tuple(range(len(arena.blocks)))
     fit = fitted(arena, posterior.tolerant, members)
@@ -66,7 +66,7 @@ def test_a_start_where_no_car_can_be_is_halved():
 def test_sets_are_refitted_where_the_simulated_car_meets_the_measured_speed_under_the_best_one():
     load = one("payload_mass")
     evidence, *_ = prepared([load], term("payload_mass", delta_mass=900.0))
-    arena = known_only(arena_of(evidence, ()), ())
+    arena = known_only(arena_of(evidence, ()))
     led = search._led(evidence, arena, compete(arena), Model())
     model = with_values(Model(), [(load, {"delta_mass": 900.0})])
 
@@ -133,7 +133,7 @@ def test_a_change_of_what_the_model_has_already():
 def test_the_metric_is_that_of_the_tolerant_inner_products():
     asked = [one("payload_mass"), one("aero_drag"), one("tyre_radius", "fl")]
     evidence, _, measure = prepared(asked, term("payload_mass", delta_mass=250.0))
-    arena = known_only(arena_of(evidence, ()), ())
+    arena = known_only(arena_of(evidence, ()))
     y = measure.rows([r[None] for r in evidence.residuals])
     whole = arena.tolerant(arena.inner(measure.weighings))
     assert float(metric(arena, measure.weighings).inner(y, y)[0, 0]) == pytest.approx(whole[-1, -1], rel=1e-5)
@@ -149,7 +149,7 @@ def test_the_nearest_rival_of_each_effect_is_refitted(monkeypatch):
     small = [one(name, w) for name in ("tyre_radius", "slip_stiffness") for w in ("fl", "fr", "rl", "rr")]
     d = prepare(signals(term("payload_mass", delta_mass=250.0), sensors=NOISY), CAR, "a")
     evidence = simulated([d], [one("payload_mass"), one("aero_drag"), *small], Model(), lambda _t, _s: None)
-    arena = known_only(arena_of(evidence, ()), ())
+    arena = known_only(arena_of(evidence, ()))
     at = {b.key: i for i, b in enumerate(arena.blocks)}
     mass, drag = at["payload_mass"], at["aero_drag"]
     sets = [((mass, i), 50.0) for i in at.values() if i not in (mass, drag)] + [((drag, at["tyre_radius@fl"]), 45.0)]

@@ -220,11 +220,8 @@ def test_a_hole_in_the_support_is_nominal():
     assert np.interp([15.0, 23.0, 30.0], *np.array(knots).T) == pytest.approx([200.0, 0.0, 200.0])
 
 
-def test_a_road_becomes_a_term_and_others_do_not():
+def test_what_the_plant_has_no_table_for_becomes_no_term():
     x = np.linspace(0.0, 3000.0, 60)
-    road = as_term(remainder(x, 0.03 * np.sin(x / 300.0), half=0.001, mechanism="road", depends_on=("position",)))
-    assert road.effect.name == "unexplained_grade"
-    assert np.interp(471.0, *np.array(road.knots).T) == pytest.approx(0.03, rel=0.02)
     assert as_term(remainder(x, 0.0 * x, mechanism="slip_f")) is None
     assert as_term(remainder(x, 0.0 * x, depends_on=("t",))) is None
     assert as_term(remainder(np.linspace(5, 40, 60), np.full(60, 1e6))) is None

@@ -16,7 +16,6 @@ from aqualog.diagnose.hypotheses import hypotheses, signatures
 from aqualog.diagnose.on_water import around_water, of_water
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import FORM, STRUCTURE, Found, Option, _levelled, _refitted, sharpened, simulated
-from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.tolerances import LANE_TOLERANCES
 from aqualog.model.follow import follow
 from aqualog.model.scenario import Lane
@@ -138,14 +137,13 @@ def test_a_drive_without_water_stays_as_it_is():
     d = prepare(signals(sensors=NOISY), CAR, "a")
     b = simulated([d], [h for h in hypotheses([d], Model())[0] if h.key == "aero_drag"], Model(), quiet)
     assert around_water(b, Model()) == (b, None)
-    assert supported(b) is b
 
 
 @pytest.mark.parametrize(("gains", "is_found"), [((0.6, 0.5), False), ((3.0, 1.0), True)])
 def test_no_name_for_what_laws_of_water_differ_by(gains, is_found):
     """Sources differ by a factor of two in the lost contact and in the drag; no file says which law a tyre has."""
     hidden = (term("contact_loss", gain=gains[0]), term("water_drag", gain=gains[1]))
-    arena = known_only(arena_of(around_water(on_water(*hidden, lanes=SHALLOW), Model())[0], ()), [])
+    arena = known_only(arena_of(around_water(on_water(*hidden, lanes=SHALLOW), Model())[0], ()))
     found = {arena.blocks[m].key.split("@")[0] for m in compete(arena).best}
     assert ("contact_loss" in found) is is_found
     assert is_found or not found
@@ -181,7 +179,7 @@ def test_the_files_own_water_is_judged_by_the_simulator():
     elsewhere = b.residuals[0] + 1.2 * b.signatures[0][column(b, "contact_loss")]
     for residuals, differs in (((elsewhere,), True), (b.residuals, False)):
         own = replace(b, residuals=residuals)
-        arena = known_only(arena_of(own, ()), [])
+        arena = known_only(arena_of(own, ()))
         options = {o.members: o.evidence for o in _refitted(own, arena, compete(arena), Model())}
         assert abs(options[()]) > 1.0 if differs else abs(options[()]) < 1e-6
 
@@ -206,12 +204,8 @@ def test_each_thing_that_water_does_is_refitted():
     assert keys <= {"water_drag", "contact_loss", "track_clearing", "uneven_water@left", "uneven_water@right"}
 
 
-def test_what_acts_everywhere_is_barred_where_only_the_water_shows_it():
+def test_a_dry_effect_is_found_on_a_wet_drive_and_no_other_stands_for_the_water():
     d = prepare(wet(term("aero_drag", delta_drag_area=0.3), sensors=NOISY), CAR, "a")
     asked = [h for h in hypotheses([d], Model())[0] if h.of_water or h.key in ("aero_drag", "payload_mass")]
-    b = supported(simulated([d], asked, Model(), quiet))
-    barred = {h.key for h, x in zip(b.asked, b.barred, strict=True) if x}
-    assert barred == {"payload_mass"}
-    arena = arena_of(b, ())
-    assert "payload_mass" not in {x.key for x in arena.blocks}
-    assert "aero_drag" in {arena.blocks[m].key for m in compete(arena).best}
+    arena = arena_of(simulated([d], asked, Model(), quiet), ())
+    assert {arena.blocks[m].key for m in compete(arena).best} == {"aero_drag"}
