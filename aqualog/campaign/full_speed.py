@@ -12,7 +12,7 @@ from aqualog.campaign.bins import DEPTH_KEYS, KMH, Group, Plan, group_of, sort_k
 from aqualog.campaign.results import CampaignData
 from aqualog.campaign.slip_slope import SLOPE_MAX, SlopeRow, SlopeTable, contact
 from aqualog.campaign.spin_downs import Pass, passes
-from aqualog.core.intervals import NOWHERE, Interval, student_quantile
+from aqualog.core.intervals import NOWHERE, Z95, Interval, student_quantile
 from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = ["EVENTS", "FullSpeed", "fit_contact", "fit_half", "full_speeds"]
@@ -20,7 +20,6 @@ __all__ = ["EVENTS", "FullSpeed", "fit_contact", "fit_half", "full_speeds"]
 MINOR_BELOW = 20.0 * KMH  # [m/s] thesis 2.1 (C17): minor spin-downs begin so far below full aquaplaning
 MINOR_HALF = 5.0 * KMH  # [m/s] tolerance of that, treated as a 95 % interval
 DRAWS = 400
-Z95 = 1.959964  # 97.5 % quantile of the normal distribution
 SEED = 20_240  # of the draws; another seed moves an interval's ends by a tenth of its width
 LEAST_BINS = 3
 LEAST_PASSES = 6

@@ -12,12 +12,13 @@ import numpy as np
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "NOWHERE", "Interval", "chi2_log_p", "half_width", "jackknife_sd", "poisson", "same_decimals", "student_quantile",
-    "variance_ratio_chance", "wilson",
+    "NOWHERE", "Z95", "Interval", "chi2_log_p", "half_width", "jackknife_sd", "poisson", "same_decimals",
+    "student_quantile", "variance_ratio_chance", "wilson",
 ]  # fmt: skip
 
 Interval = tuple[float, float]
 NOWHERE: Interval = (math.nan, math.nan)
+Z95 = 1.959964  # 97.5 % quantile of the normal distribution
 
 
 def same_decimals(value: float, ci: Interval) -> tuple[str, str, str]:

@@ -11,9 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from aqualog.core.intervals import chi2_log_p
+from aqualog.core.intervals import Z95, chi2_log_p
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.outcome import Z
 from aqualog.diagnose.records import AGREES, Agreement, ByDrive, Cause, Estimate
 from aqualog.diagnose.refit import KNOWN, PRIOR_WIDTH, Refit, metric
 from aqualog.diagnose.search import Found
@@ -45,7 +44,7 @@ def agreements(found: Found, r: Refit) -> tuple[Agreement, ...]:
     for k, (i, name) in enumerate(r.names):
         unit = r.members[i].parameter(name).unit
         values = r.values[k] + alone[:, k]
-        half = Z * sd[:, k]
+        half = Z95 * sd[:, k]
         each = [Estimate(float(v), float(v - h), float(v + h), unit) for v, h in zip(values, half, strict=True)]
         p = 10.0 ** -chi2_log_p(_heterogeneity(each), len(drives) - 1)
         of_drives = tuple(
@@ -92,15 +91,15 @@ def _having(cause: Cause, a: Agreement) -> list[ByDrive]:
 
 def _mean(each: Sequence[Estimate], low: float, high: float) -> Estimate:
     """Weighted mean with its interval, within bounds."""
-    weight = np.array([(2.0 * Z / (e.high - e.low)) ** 2 for e in each])
-    value, half = float(np.average([e.value for e in each], weights=weight)), Z / math.sqrt(float(weight.sum()))
+    weight = np.array([(2.0 * Z95 / (e.high - e.low)) ** 2 for e in each])
+    value, half = float(np.average([e.value for e in each], weights=weight)), Z95 / math.sqrt(float(weight.sum()))
     return Estimate(min(max(value, low), high), max(value - half, low), min(value + half, high), each[0].unit)
 
 
 def _heterogeneity(each: Sequence[Estimate]) -> float:
     """Sum of squared deviations from the weighted mean in standard deviations: chi^2 of one degree less than values."""
     values = np.array([e.value for e in each])
-    weight = np.array([(2.0 * Z / (e.high - e.low)) ** 2 for e in each])
+    weight = np.array([(2.0 * Z95 / (e.high - e.low)) ** 2 for e in each])
     return float((weight * (values - float(weight @ values) / float(weight.sum())) ** 2).sum())
 
 

@@ -10,10 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.intervals import Z95
 from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.diagnose.full_rate import LEVEL, Kind, PerTurn, Z, per_turn, wheel_columns
+from aqualog.diagnose.full_rate import LEVEL, Kind, PerTurn, per_turn, wheel_columns
 from aqualog.diagnose.isolate import POWER
 from aqualog.diagnose.records import SURE, Cause, Estimate, Limit, Verdict
 from aqualog.diagnose.seams import seams
@@ -31,6 +32,7 @@ __all__ = [
 SHOWN = 5e-4  # smallest amplitude that is worth a remark
 SOUND = 20.0  # cars without a fault of this kind for one with it (K)
 _RING = EFFECTS["tone_ring"]
+_AMPLITUDE = _RING.parameters[0]
 
 
 class Faster(NamedTuple):
@@ -106,9 +108,7 @@ def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
 
     Larger than the effect's smallest size only; `remarks` has the rest.
     """
-    effect = EFFECTS["tone_ring"]
-    smallest = effect.parameters[0].smallest
-    rings = {f.wheel: f for f in found if f.order == 1 and f.kind == "ring" and f.amplitude >= smallest}
+    rings = {f.wheel: f for f in found if f.order == 1 and f.kind == "ring" and f.amplitude >= _AMPLITUDE.smallest}
     out = []
     for where, wheels in (*AXLES.items(), *SIDES.items()):
         pair = [rings[w] for w in wheels if w in rings]
@@ -121,25 +121,25 @@ def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
     for where, pair in out:
         mean = float(np.mean([f.amplitude for f in pair]))
         half = 0.5 * math.sqrt(sum((f.high - f.low) ** 2 for f in pair)) / len(pair)
-        half = math.hypot(half, Z * DOUBT * mean)  # filters of control units and loggers
-        value = Estimate(mean, max(mean - half, 0.0), mean + half, effect.parameters[0].unit)
-        parameters = {effect.parameters[0].name: value}
+        half = math.hypot(half, Z95 * DOUBT * mean)  # filters of control units and loggers
+        value = Estimate(mean, max(mean - half, 0.0), mean + half, _AMPLITUDE.unit)
+        parameters = {_AMPLITUDE.name: value}
         channels = tuple(f"omega_{f.wheel}" for f in pair)
-        sentence = cause_sentence(effect, where, parameters)
-        causes.append(Cause(effect.name, where, parameters, channels, sentence, _probability(pair, value, smallest)))
+        sentence = cause_sentence(_RING, where, parameters)
+        causes.append(Cause(_RING.name, where, parameters, channels, sentence, _probability(pair, value)))
     return tuple(causes)
 
 
 def limits(found: Sequence[PerTurn]) -> tuple[Limit, ...]:
     """Amplitude of a ring that is named with a power of 0.9, of each wheel and of axles and sides with one value; NaN
     beyond the effect's bound, and where a resonance covers it."""
-    p = _RING.parameters[0]
+    p = _AMPLITUDE
     once = {f.wheel: f for f in found if f.order == 1 and f.kind != "untested"}
     own = {w: (w,) for w in once} | {k: v for k, v in (AXLES | SIDES).items() if all(w in once for w in v)}
     sure = sum(NormalDist().inv_cdf(q) for q in (SURE, POWER))
     out = []
     for where, wheels in own.items():
-        sd = 0.5 / Z * math.hypot(*(once[w].high - once[w].low for w in wheels)) / len(wheels)
+        sd = 0.5 / Z95 * math.hypot(*(once[w].high - once[w].low for w in wheels)) / len(wheels)
         size = p.smallest + sure * math.hypot(sd, DOUBT * p.smallest)
         size = p.smallest + sure * math.hypot(sd, DOUBT * size)  # the doubt is a share of the amplitude itself
         hidden = size > p.high or any(once[w].kind == "speed" for w in wheels)
@@ -147,7 +147,7 @@ def limits(found: Sequence[PerTurn]) -> tuple[Limit, ...]:
     return tuple(out)
 
 
-def _probability(wheels: Sequence[PerTurn], value: Estimate, smallest: float) -> float:
+def _probability(wheels: Sequence[PerTurn], value: Estimate) -> float:
     """That it is there and larger than what sound wheels show.
 
     There: from the p-value of each wheel by the bound -e p ln p on the evidence for chance [sellke2001]. Larger: from
@@ -157,8 +157,8 @@ def _probability(wheels: Sequence[PerTurn], value: Estimate, smallest: float) ->
     for f in wheels:
         p = min(max(f.p_value, 1e-300), math.exp(-1.0))
         there *= 1.0 / (1.0 - SOUND * math.e * p * math.log(p))
-    sd = max((value.value - value.low) / Z, 1e-12)
-    return there * NormalDist().cdf((value.value - smallest) / sd)
+    sd = max((value.value - value.low) / Z95, 1e-12)
+    return there * NormalDist().cdf((value.value - _AMPLITUDE.smallest) / sd)
 
 
 def pooled(by_drive: Sequence[Sequence[PerTurn]]) -> tuple[PerTurn, ...]:
@@ -185,8 +185,8 @@ def _together(own: Sequence[PerTurn]) -> PerTurn:
 
 def without_known(found: Sequence[PerTurn], known: Mapping[str, float]) -> tuple[PerTurn, ...]:
     """Without what a model's tone rings give already, by wheel: no more than the smallest size from it."""
-    smallest = EFFECTS["tone_ring"].parameters[0].smallest
-    return tuple(f for f in found if f.order > 1 or abs(f.amplitude - known.get(f.wheel, math.inf)) >= smallest)
+    least = _AMPLITUDE.smallest
+    return tuple(f for f in found if f.order > 1 or abs(f.amplitude - known.get(f.wheel, math.inf)) >= least)
 
 
 def why_untested(found: Sequence[PerTurn]) -> str:
@@ -199,7 +199,6 @@ def why_untested(found: Sequence[PerTurn]) -> str:
 
 def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
     """Sentences about what is found and is no cause."""
-    smallest = EFFECTS["tone_ring"].parameters[0].smallest
     out, small = [], []
     for f in found:
         if not f.found or (f.most if f.kind == "speed" else f.amplitude) < SHOWN:
@@ -210,7 +209,7 @@ def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
             out.append(f"{what}; {f.reason}: a resonance or the tyre, not the tone ring.")
         elif f.order > 1:
             out.append(f"{what} at all speeds: the tyre or the pick-up, not an eccentric ring.")
-        elif f.amplitude < smallest:
+        elif f.amplitude < _AMPLITUDE.smallest:
             small.append(f"{f.amplitude:.2%}{place(f.wheel)}")
     if small:
         out.append(f"Wheel speeds vary once per turn, too little to be worth naming: by {', '.join(small)}.")

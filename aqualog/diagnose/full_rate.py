@@ -14,17 +14,16 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from aqualog.core.intervals import chi2_log_p
+from aqualog.core.intervals import Z95, chi2_log_p
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Origin, Signals
 from aqualog.core.units import is_unit, parse_unit
 from aqualog.diagnose.inputs import SPEED_S, lasting, smooth
 
-__all__ = ["LEVEL", "ORDERS", "PerTurn", "Z", "per_turn", "wheel_columns"]
+__all__ = ["LEVEL", "ORDERS", "PerTurn", "per_turn", "wheel_columns"]
 
 ORDERS = (1, 2, 3)
 LEVEL = 0.01  # false alarms per drive, over all wheels and orders
-Z = 1.959964  # 97.5 % quantile of the normal distribution
 LEAST_HZ = 2.0  # slower, the driver and the springs move the car: the mean over a second ends there
 NYQUIST = 0.8  # share of the highest frequency that a rate can show
 LEAST_TURNS = 100
@@ -198,8 +197,8 @@ def _tested(wheel: _Wheel, order: int, slack: float) -> PerTurn | str:
         return best
     w = part.weight * gain
     by_most, by_least = (float(w @ g) / float(w @ gain) for g in (most, least))
-    low = math.sqrt(max(best.square - Z * best.sd, 0.0)) / by_most
-    high = math.sqrt(max(best.square + Z * best.sd, 0.0)) / by_least
+    low = math.sqrt(max(best.square - Z95 * best.sd, 0.0)) / by_most
+    high = math.sqrt(max(best.square + Z95 * best.sd, 0.0)) / by_least
     unlike = _speed_dependence(part, order, gain, best)
     return PerTurn(
         "", order, "speed" if unlike[0] else "ring", math.sqrt(max(best.square, 0.0)), low, high,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.errors import FitError
-from aqualog.core.intervals import student_quantile
+from aqualog.core.intervals import Z95, student_quantile
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import CHANNELS, block_means, block_step
 from aqualog.diagnose.drive import Drive, led_by
@@ -28,7 +28,6 @@ __all__ = [
 BLOCK_S = 20.0  # [s] longer than the noise of any channel remembers
 DRIVES_AS_UNITS = 5  # with fewer drives their spread cannot be estimated
 DRAWS = 2000
-Z = 1.959964  # 97.5 % quantile of the normal distribution
 FREE_RATE = 1.0 / 30.0  # [1/s] free simulation forgets errors after half a minute, so that one gust does not dominate
 SPEED = "speed"
 
@@ -137,7 +136,7 @@ def log_score_gain(before: Sequence[FloatArray], after: Sequence[FloatArray], *,
         if s.size > 1:
             drawn = s[rng.integers(s.size, size=(DRAWS, s.size))].sum(axis=1) - s.sum()
             deviation += math.sqrt(s.size / (s.size - 1.0)) * drawn
-    wider = student_quantile(0.975, freedom) / Z
+    wider = student_quantile(0.975, freedom) / Z95
     low, high = np.quantile(deviation, [0.025, 0.975])
     return LogScoreGain(value, value + wider * float(low), value + wider * float(high))
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.core.intervals import Z95
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.compete import Members, Posterior, fitted
@@ -24,7 +25,6 @@ from aqualog.model.term import Model
 
 __all__ = ["conclude", "repeats", "with_causes"]
 
-Z = 1.959964  # 97.5 % quantile of the normal distribution
 EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect explains it
 THIRDS = 3
 SEEN = 2.0  # standard deviations at which a third of the drive says something of a value
@@ -140,8 +140,8 @@ def _cause(
     for name, x, change, s in zip(h.free, values.tolist(), off.tolist(), sd.tolist(), strict=True):
         p = h.parameter(name)
         v = min(max(x, p.low), p.high)
-        parameters[name] = Estimate(v, max(v - Z * s, p.low), min(v + Z * s, p.high), p.unit)
-        large |= abs(change) >= max(h.worth_naming(name), Z * s)
+        parameters[name] = Estimate(v, max(v - Z95 * s, p.low), min(v + Z95 * s, p.high), p.unit)
+        large |= abs(change) >= max(h.worth_naming(name), Z95 * s)
     for name, value in h.fixed.items():
         if name in {p.name for p in h.effect.parameters} and name not in parameters:
             parameters[name] = Estimate(float(value), math.nan, math.nan, h.parameter(name).unit)
