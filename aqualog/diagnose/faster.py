@@ -46,17 +46,10 @@ class Faster(NamedTuple):
 
 
 def faster(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, model: Model, *, seed: int = 1) -> Faster:
-    """Look at the signals at their own rate.
+    """Look at the signals of one car in one state at their own rate.
 
-    Parameters
-    ----------
-    drives : sequence of (name, Signals)
-        Those of the diagnosis: one car in one state, so that a ring is the same in all of them.
-    vehicle : Vehicle
-    model : Model
-        Rings that it has are known, and are no finding at that size.
-    seed : int
-        Of the permutations that calibrate the search for seams.
+    Rings that the `model` has are known, and are no finding at that size; `seed`: of the permutations that calibrate
+    the search for seams.
     """
     found = pooled([per_turn(wheel_columns(s), s.dt, s.origins) for _, s in drives])
     sharp = limits(found)

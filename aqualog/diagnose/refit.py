@@ -130,17 +130,8 @@ def metric(
 def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure: Metric, model: Model) -> Refit | None:
     """Gauss-Newton in the simulator from the linear values on; None if it has no solution within the bounds.
 
-    Parameters
-    ----------
-    evidence : Evidence
-    chosen : sequence of int
-        Hypotheses of the set.
-    start : array (k,)
-        Changes of their values with which the search starts.
-    measure : Metric
-        Held fixed, so that sets can be compared.
-    model : Model
-        On which the set comes.
+    `chosen`: hypotheses of the set; `start` (k,): changes of their values with which the search starts; `measure`: held
+    fixed, so that sets can be compared; `model`: on which the set comes.
     """
     members = tuple(evidence.asked[m] for m in chosen)
     names = tuple((i, n) for i, h in enumerate(members) for n in h.free)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from aqualog.core.records import FloatArray
@@ -12,7 +14,7 @@ from aqualog.diagnose.words import listed, quantity
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Term
 
-__all__ = ["as_term", "describe", "short_form"]
+__all__ = ["COORDINATES", "as_term", "describe", "short_form"]
 
 _CARRIED = ("force", ("v_x",))  # mechanism and coordinate that the plant has a table for
 TAPER = 0.08  # of the range: beyond the driven range, the function falls to zero over this share
@@ -21,13 +23,9 @@ SHORT_HOLE = 4  # points; a longer stretch without data is nominal
 
 
 def as_term(remainder: Remainder) -> Term | None:
-    """The term that takes a remainder into the model.
+    """The term that takes a remainder into the model: the function within the driven range, zero a little outside.
 
-    Returns
-    -------
-    term : Term or None
-        The function within the driven range; outside it falls to zero over a short distance. None if
-        the model has no table for this mechanism over these coordinates, or the function is beyond physical bounds.
+    None if the model has no table for this mechanism over these coordinates, or beyond physical bounds.
     """
     if (remainder.mechanism, remainder.depends_on) != _CARRIED:
         return None
@@ -84,21 +82,31 @@ def _needed(x: FloatArray, f: FloatArray, tolerance: float) -> list[int]:
     return sorted(kept)
 
 
-_COORDINATES: dict[str, tuple[str, str]] = {
-    "v_x": ("speed", "m/s"),
-    "torque": ("torque", "N·m"),
-    "a_x": ("acceleration", "m/s²"),
-    "a_y": ("lateral acceleration", "m/s²"),
-    "position": ("place on the road", "m"),
-    "t": ("time", "s"),
-    "water_depth": ("water depth", "m"),
-    "ambient_temperature": ("air temperature", "K"),
-    "steer_angle": ("steer angle", "rad"),
-    "yaw_rate": ("yaw rate", "rad/s"),
-    "since_braking": ("time since braking", "s"),
-    "depth": ("water depth", "m"),  # of a campaign's runs, like the next ones
-    "pressure": ("tyre pressure", "Pa"),
-    "load": ("load", "kg"),
+class Coordinate(NamedTuple):
+    """Title and unit of a coordinate in sentences; its unit on pages, and factor and offset to that."""
+
+    title: str
+    unit: str
+    page_unit: str
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+COORDINATES = {
+    "v_x": Coordinate("speed", "m/s", "km/h", 3.6),
+    "torque": Coordinate("torque", "N·m", "N·m"),
+    "a_x": Coordinate("acceleration", "m/s²", "m/s²"),
+    "a_y": Coordinate("lateral acceleration", "m/s²", "m/s²"),
+    "position": Coordinate("place on the road", "m", "m"),
+    "t": Coordinate("time", "s", "s"),
+    "water_depth": Coordinate("water depth", "m", "mm", 1e3),
+    "ambient_temperature": Coordinate("air temperature", "K", "°C", 1.0, -273.15),
+    "steer_angle": Coordinate("steer angle", "rad", "rad"),
+    "yaw_rate": Coordinate("yaw rate", "rad/s", "rad/s"),
+    "since_braking": Coordinate("time since braking", "s", "s"),
+    "depth": Coordinate("water depth", "m", "mm", 1e3),  # of a campaign's runs, like the next ones
+    "pressure": Coordinate("tyre pressure", "Pa", "bar", 1e-5),
+    "load": Coordinate("load", "kg", "kg"),
 }
 _CHANNELS = {
     "kinematic": "accelerometer against the change of speed", "lateral": "lateral acceleration",
@@ -111,17 +119,17 @@ ALIKE = 0.9  # cosine from which a known effect looks nearly the same
 def describe(mechanism: Mechanism, r: Remainder) -> str:
     """Sentences: mechanism and coordinate, its largest value, coordinates that explain it as well, similar effects."""
     title = _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title.lower() if r.channel in CHANNELS else r.channel)
-    how = r.manner or f"goes with {' and '.join(map(_word, r.depends_on))}"
+    how = r.manner or f"goes with {' and '.join(map(_title, r.depends_on))}"
     text = f"Unexplained: {mechanism.title} {how} (probability {r.probability:.2f}"
     text += f"; {r.share:.0%} of the variance of the {title}"
     sure = np.isfinite(r.f) & ((r.low > 0.0) | (r.high < 0.0))
     if sure.any():
         at = int(np.argmax(np.where(sure, np.abs(r.f), -1.0)))
-        there = ", ".join(f"{v:.4g} {_unit(n)}".removesuffix(" -") for n, v in zip(r.depends_on, r.x[at], strict=True))
+        there = ", ".join(f"{v:.4g} {COORDINATES[n].unit}" for n, v in zip(r.depends_on, r.x[at], strict=True))
         text += f"; {quantity(float(r.f[at]), mechanism.unit, change=True)} at {there}"
     text += ")."
     if r.proxies:
-        text += f" It cannot be distinguished from {listed([*map(_word, r.proxies)])} here."
+        text += f" It cannot be distinguished from {listed([*map(_title, r.proxies)])} here."
     # what comes again at equal ways does not at equal times, unless the speed never changes: then both are likely
     if {"t", "position"} & set(r.depends_on) and not r.manner.startswith(("in waves", "for ")):
         text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."
@@ -134,13 +142,9 @@ def describe(mechanism: Mechanism, r: Remainder) -> str:
 def short_form(remainder: Remainder) -> str:
     """`a force on the car that goes with speed`, `a force on the car from 66 s to 145 s`."""
     title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), remainder.channel)
-    how = remainder.manner or f"that goes with {' and '.join(map(_word, remainder.depends_on))}"
+    how = remainder.manner or f"that goes with {' and '.join(map(_title, remainder.depends_on))}"
     return f"{title} {how}"
 
 
-def _word(name: str) -> str:
-    return _COORDINATES.get(name, (name, ""))[0]
-
-
-def _unit(name: str) -> str:
-    return _COORDINATES.get(name, ("", "-"))[1]
+def _title(name: str) -> str:
+    return COORDINATES[name].title

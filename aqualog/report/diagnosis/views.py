@@ -11,7 +11,8 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.records import ResidualView
-from aqualog.report.diagnosis.words import COORDINATES, channel_title
+from aqualog.diagnose.unknown_term import COORDINATES
+from aqualog.report.diagnosis.words import channel_title
 from aqualog.report.figures import axis, dots, figure, line, rounded
 from aqualog.report.theme import wheel_colour
 from aqualog.report.values import plot_text, pretty_unit
@@ -29,8 +30,10 @@ _SPREAD = (50.0, 15.865, 84.135)  # [%] median, and what one standard deviation 
 
 def coordinate_axis(name: str) -> tuple[str, float, float]:
     """Title with unit, factor and offset of a coordinate; one that is not known keeps its name and value."""
-    label, unit, factor, offset = COORDINATES.get(name, (name.replace("_", " "), "", 1.0, 0.0))
-    return (f"{label} [{unit}]" if unit else plot_text(label)), factor, offset
+    if name not in COORDINATES:
+        return plot_text(name.replace("_", " ")), 1.0, 0.0
+    c = COORDINATES[name]
+    return f"{c.title} [{c.page_unit}]", c.factor, c.offset
 
 
 def view_data(views: Sequence[ResidualView], explained: Sequence[str] = ()) -> dict[str, Any]:

@@ -7,11 +7,12 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any
 
 from aqualog.diagnose.shapes import MECHANISMS
+from aqualog.diagnose.unknown_term import COORDINATES
 from aqualog.report.values import interval_text, percent, pretty_unit, short, upper_first
 from aqualog.report.wording import detector_name
 
 __all__ = [
-    "COORDINATES", "by_change", "by_sharpness", "chance", "channel_title", "coordinate_title", "effect_title",
+    "by_change", "by_sharpness", "chance", "channel_title", "coordinate_title", "effect_title",
     "mechanism_title", "sentences", "untested_by_reason", "verdict_title",
 ]  # fmt: skip
 
@@ -32,26 +33,6 @@ _CHANNELS = {
     "side_slip_r": "rear wheels, left against right",
     "lateral": "lateral acceleration",
 }
-COORDINATES: dict[str, tuple[str, str, float, float]] = {
-    "t": ("time", "s", 1.0, 0.0),
-    "v_x": ("speed", "km/h", 3.6, 0.0),
-    "torque": ("torque of all wheels", "N·m", 1.0, 0.0),
-    "position": ("position", "m", 1.0, 0.0),
-    "a_x": ("acceleration", "m/s²", 1.0, 0.0),
-    "a_y": ("lateral acceleration", "m/s²", 1.0, 0.0),
-    "yaw_rate": ("yaw rate", "rad/s", 1.0, 0.0),
-    "since_braking": ("time since braking", "s", 1.0, 0.0),
-    "steer_angle": ("steer angle", "rad", 1.0, 0.0),
-    "water_depth": ("water depth", "mm", 1e3, 0.0),
-    "temperature": ("temperature", "°C", 1.0, -273.15),
-    "ambient_temperature": ("ambient temperature", "°C", 1.0, -273.15),
-    "slip": ("slip", "–", 1.0, 0.0),
-    "depth": ("water depth", "mm", 1e3, 0.0),  # those of a campaign's runs
-    "pressure": ("tyre pressure", "bar", 1e-5, 0.0),
-    "load": ("load", "kg", 1.0, 0.0),
-}
-"""Name of a coordinate, its unit on pages, and factor and offset to that unit."""
-
 _PLACES = {"f": "front", "r": "rear"}
 _OF_BUSES = ("clock_skew",)  # one signal stands for its bus, whether or not the log has that one
 _BUSES = {"torque_fl": "wheel torque"}
@@ -86,7 +67,7 @@ def effect_title(key: str) -> str:
 
 def coordinate_title(name: str) -> str:
     """`v_x` -> `speed`."""
-    return COORDINATES[name][0] if name in COORDINATES else name.replace("_", " ")
+    return COORDINATES[name].title if name in COORDINATES else name.replace("_", " ")
 
 
 def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:

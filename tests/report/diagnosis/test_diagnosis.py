@@ -41,7 +41,7 @@ def metas(browser):
 def test_panels_change_with_coordinate_drive_and_samples(show):
     browser = show("named")
     wait_for(lambda: browser.execute_script(DRAWN) >= 4)
-    assert axis_title(browser) == "torque of all wheels [N·m]"  # what tells most about the explained channel
+    assert axis_title(browser) == "torque [N·m]"  # what tells most about the explained channel
     click(browser, '#coordinate-choice button[value="v_x"]')
     wait_for(lambda: axis_title(browser) == "speed [km/h]")
     assert metas(browser).count("median") == 2
