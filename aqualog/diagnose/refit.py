@@ -25,7 +25,6 @@ SHRINK = (1.0, 0.5, 0.2)
 ROUNDS = 6
 HOLDS = 0.1  # share by which a signature may miss its predicted gain before it is simulated again
 ENOUGH = 0.3  # of twice the log-likelihood
-FREEDOM = 3.0  # degrees of the distribution of sizes: the fewest with a variance (K)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +32,8 @@ class Refit:
     """A set at its best values.
 
     `values` (k,) absolute, `off` (k,) from those of the model that it came on, `covariance` (k, k) without inflation,
-    `loss` the sum of squares in the metric of noise and tolerances, plus the penalty of values beyond their usual
-    sizes; `residuals` (C, n) and `signatures` (k, C, n) per drive at these values; `bounded` (k,): whether a value sits
-    at its physical bound; `unlikely`: the share of `loss` due to that penalty.
+    `loss` the sum of squares in the metric of noise and tolerances; `residuals` (C, n) and `signatures` (k, C, n) per
+    drive at these values; `bounded` (k,): whether a value sits at its physical bound.
     """
 
     members: tuple[Hypothesis, ...]
@@ -48,7 +46,6 @@ class Refit:
     residuals: tuple[FloatArray, ...]
     signatures: tuple[FloatArray, ...]
     bounded: tuple[bool, ...]
-    unlikely: float = 0.0
 
     @property
     def at_bound(self) -> bool:
@@ -183,20 +180,8 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
     covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0)) + np.diag(measure.apart[columns] ** 2)
     bounded = tuple(bool(x) for x in (values <= low + 1e-12) | (values >= high - 1e-12))
     off = values - base
-    unlikely = _unlikely(off / evidence.prior[columns])
-    loss += unlikely - float(((off / width) ** 2).sum())
-    return Refit(
-        members, names, values, off, np.asarray(covariance), loss, extended, tuple(residuals), here, bounded, unlikely
-    )  # fmt: skip
-
-
-def _unlikely(z: FloatArray) -> float:
-    """Twice the negative log of how likely values are, by their usual size: Student's distribution, 0 at no deviation.
-
-    Its tails are heavy, because a single fault may well be large. Two large faults that cancel are a rare coincidence,
-    and near twins change a residual little. Normal tails would instead split a large fault among twins.
-    """
-    return float((FREEDOM + 1.0) * np.log1p(z**2 / FREEDOM).sum())
+    loss -= float(((off / width) ** 2).sum())
+    return Refit(members, names, values, off, np.asarray(covariance), loss, extended, tuple(residuals), here, bounded)
 
 
 def _loss(measure: Metric, y: FloatArray, off: FloatArray) -> float:

@@ -304,8 +304,7 @@ def _levelled(
         if members in equal and o.refit is not None:
             if top is None or top.refit is None or not _plausible(o.refit):
                 continue
-            worse = (o.refit.loss - o.refit.unlikely) - (top.refit.loss - top.refit.unlikely)
-            gained = top.evidence - 0.5 * max(worse, 0.0)
+            gained = top.evidence - 0.5 * max(o.refit.loss - top.refit.loss, 0.0)
         elif (
             # an effect in place of another; one more has no better claim than its evidence
             top is not None
@@ -416,7 +415,7 @@ def sharpened(found: Found, option: Option, model: Model) -> tuple[Refit | None,
 
     def loss(r: Refit) -> float:
         y = known.rows([x[None] for x in r.residuals])
-        return float(known.inner(y, y)[0, 0]) + r.unlikely
+        return float(known.inner(y, y)[0, 0])
 
     best = option.refit if again is None or again.at_bound else min(again, option.refit, key=loss)
     return best, loss(best)

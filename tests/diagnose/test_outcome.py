@@ -29,7 +29,7 @@ SURE = 10.0  # [nats] ahead of nothing
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
     """No simulation: a set keeps its values, and its loss in a metric of few tolerances is made up."""
-    monkeypatch.setattr(outcome, "sharpened", lambda _f, o, _m: (o.refit, o.refit.unlikely))
+    monkeypatch.setattr(outcome, "sharpened", lambda _f, o, _m: (o.refit, o.refit.loss))
     monkeypatch.setattr(outcome, "repeats", lambda *_: ())
 
 
@@ -41,7 +41,7 @@ def option(evidence=SURE, sharp=0.0, signatures=S, model=Model(), **values):  # 
     names = tuple((k, h.free[0]) for k, h in enumerate(members))
     off = x - [value_in(model, h, h.free[0]) for h in members]
     cov = np.diag((0.1 * off) ** 2)
-    r = Refit(members, names, x, off, cov, 0.0, Model(), (LEFT,), (signatures[index],), (False,) * len(index), sharp)
+    r = Refit(members, names, x, off, cov, sharp, Model(), (LEFT,), (signatures[index],), (False,) * len(index))
     blocks = tuple(next(b for b, block in enumerate(ARENA.blocks) if block.tag == i) for i in index)
     return Option(blocks, evidence, r)
 
