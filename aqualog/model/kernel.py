@@ -91,7 +91,9 @@ def run(
     memory = np.zeros(1, dtype=_MEMORY)
     memory["y"] = y0
     car, wheels, drag = flat(plant, **settings, dt=float(dt), ds=float(road.ds))
-    rows: FloatArray = integrate(every, memory, car, wheels, drag, road.lanes, road.fields, series, applied)
+    # from NumPy, which asks for large pages: 120 s take 125 MB, and a fault for every 4 kB took a fifth of the time
+    rows = np.empty((MOTION_WIDTH if controls.motion_only else WIDTH, n // every + 1)).T  # each column in one piece
+    integrate(every, memory, car, wheels, drag, road.lanes, road.fields, series, applied, rows)
     return rows
 
 
@@ -108,14 +110,14 @@ _kingpin_moment = inlined(steering.kingpin_moment)
 _PER_FORCE = 1.0 / (steering.STEERING.stiffness * steering.STEERING.arm)  # [rad/N] of the column, at the road wheels
 
 
-# memory of a step: state `y`, derivative `f` and stiff Jacobian `jac` there, the stages with the Jacobian of the first,
-# the record `out`; of each wheel the share of the brake that is held off, and torque on top of the driver's [N·m]; the
-# angle at which the rack stands and how far the rods' force bends the column [rad]
+# memory of a step: state `y`, derivative `f` there, both stages with the stiff Jacobian `jac` of the first, the record
+# `out`; of each wheel the share of the brake that is held off, and torque on top of the driver's [N·m]; the angle at
+# which the rack stands and how far the rods' force bends the column [rad]
 _MEMORY = np.dtype([
     *((name, np.float64, N_STATES) for name in ("y", "f", "k1", "k2", "rest")),
-    *((name, np.float64, N_JACOBIAN) for name in ("jac", "jac_0")),
+    ("jac", np.float64, N_JACOBIAN),
     ("out", np.float64, WIDTH), *((name, np.float64, 4) for name in ("released", "releasing", "applied")),
-    *((name, np.float64) for name in ("is_recorded", "is_detailed", "rack", "bent")),
+    *((name, np.float64) for name in ("is_first", "is_recorded", "is_detailed", "rack", "bent")),
 ])  # fmt: skip
 
 
@@ -138,7 +140,7 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
     `p` and `wheels` are the records of `plant.flat`; `track` (m, 3) holds the stretch and the film behind the left and
     right front wheel.
     """
-    y, jac = m.y, m.jac
+    y = m.y
     position = y[S]
     grade = c.grade + at_position(fields, GRADE, position, p.ds)
     drag = _drag(y, c, p, wheels, knots)
@@ -159,9 +161,8 @@ def _rhs(t, m, c, p, wheels, knots, lanes, fields, track):  # type: ignore[no-un
     behind = track_row(track, way_rear, p.ds)
     front = Place(position, stretch_at(lanes, t, position), -1)
     rear = Place(way_rear, int(track[behind, 0]) if behind >= 0 else -1, behind)
-    jac[V_X] = 0.0
-    jac[V_Y] = 0.0
-    jac[YAW_RATE] = 0.0
+    if m.is_first > 0.0:
+        m.jac[V_X], m.jac[V_Y], m.jac[YAW_RATE] = 0.0, 0.0, 0.0
     sum_x = 0.0
     sum_y = 0.0
     moment = 0.0
@@ -309,8 +310,8 @@ def _fill(applied, of_time, k):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applied):  # type: ignore[no-untyped-def]
-    """Integrate over all rows of `controls` from the state in `memory`; record every `every`-th step, the first too.
+def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applied, rows):  # type: ignore[no-untyped-def]
+    """Integrate over all rows of `controls` from the state in `memory`; fill `rows` at every `every`-th step.
 
     ROS2 [verwer1999], a Rosenbrock [rosenbrock1963] W-method [steihaug1979] of two stages: second order for any
     Jacobian, L-stable for the part in the Jacobian, which is the stiff one: wheels and body on the tyres' slip.
@@ -321,9 +322,8 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
     y = np.empty(N_STATES)
     for i in range(N_STATES):
         y[i] = m.y[i]
-    wanted = MOTION_WIDTH if p.motion_only > 0.0 else WIDTH
+    wanted = rows.shape[1]
     needs_detail = lanes.shape[0] > 0 or p.steering_friction > 0.0  # what a step leaves for later ones
-    rows = np.zeros((wanted, n // every + 1)).T  # each column in one piece
     cells = 2 + int((n * dt * 120.0 + 50.0) / p.ds) if lanes.shape[0] > 0 else 2
     track = np.zeros((cells, 3))
     track[:, 0] = -1.0
@@ -332,6 +332,7 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
         t = k * dt
         _fill(m.applied, applied, k)
         is_kept = k % every == 0
+        m.is_first = 1.0
         m.is_recorded = 1.0 if is_kept or needs_detail else 0.0
         m.is_detailed = 1.0 if needs_detail or (is_kept and wanted == WIDTH) else 0.0
         _rhs(t, m, controls[k], p, wheels, knots, lanes, fields, track)
@@ -346,18 +347,15 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
             antilock(m, dt)
         if p.steering_friction > 0.0:
             _settle_rack(m, wheels, p.steering_friction)
-        for i in range(N_JACOBIAN):
-            m.jac_0[i] = m.jac[i]
-        _solve(m.f, m.jac_0, h, m.k1)
+        _solve(m.f, m.jac, h, m.k1)
         for i in range(N_STATES):
             m.y[i] = y[i] + dt * m.k1[i]
         _fill(m.applied, applied, k + 1)
-        m.is_recorded = 0.0
-        m.is_detailed = 0.0
+        m.is_first, m.is_recorded, m.is_detailed = 0.0, 0.0, 0.0
         _rhs(t + dt, m, controls[k + 1], p, wheels, knots, lanes, fields, track)
         for i in range(N_STATES):
             m.rest[i] = m.f[i] - 2.0 * m.k1[i]
-        _solve(m.rest, m.jac_0, h, m.k2)
+        _solve(m.rest, m.jac, h, m.k2)
         total = 0.0
         for i in range(N_STATES):
             y[i] += dt * (1.5 * m.k1[i] + 0.5 * m.k2[i])
@@ -365,5 +363,4 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
             total += y[i]
         if not np.isfinite(total):
             rows[:] = np.nan
-            return rows
-    return rows
+            return

@@ -237,7 +237,8 @@ def wheel(i, now, ground, command, m, p, q):  # type: ignore[no-untyped-def]
             balance.torque - F_x * roll.r_e - (balance.resisting + balance.braking) * balance.turn + ground.bump
         ) / q.inertia
     m.f[ANGLE + i] = m.y[OMEGA + i]
-    _jacobian(i, m, F_x, roll, slips, stiff, wet.contact, balance, p, q)
+    if m.is_first > 0.0:
+        _jacobian(i, m, F_x, roll, slips, stiff, wet.contact, balance, p, q)
     out = m.out
     if m.is_recorded > 0.0:
         out[AT.omega + i] = m.y[OMEGA + i]
@@ -337,13 +338,10 @@ def _slip(i, m, roll, sigma):  # type: ignore[no-untyped-def]
         rate = speed / sigma
         m.f[SLIP_X + i] = rate * (s_x - m.y[SLIP_X + i])
         m.f[SLIP_Y + i] = rate * (s_y - m.y[SLIP_Y + i])
-        m.jac[SLIP_X + i] = -rate
-        m.jac[SLIP_Y + i] = -rate
+        if m.is_first > 0.0:
+            m.jac[SLIP_X + i] = -rate
+            m.jac[SLIP_Y + i] = -rate
         return _Slip(m.y[SLIP_X + i], m.y[SLIP_Y + i], 0.0, 0.0)
-    m.f[SLIP_X + i] = 0.0
-    m.f[SLIP_Y + i] = 0.0
-    m.jac[SLIP_X + i] = 0.0
-    m.jac[SLIP_Y + i] = 0.0
     by_omega = max(roll.along, 0.0) * roll.r_e / (speed * speed) if abs(roll.rim) > 0.5 else 2.0 * roll.r_e
     return _Slip(s_x, s_y, by_omega, -1.0 / speed)
 
