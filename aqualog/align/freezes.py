@@ -117,7 +117,7 @@ class FreezeWatch:
             return
         if not self._t.size:
             self._since = self._first_ns = int(t_ns[0])
-        t, x = np.concatenate([self._t, t_ns]), np.concatenate([self._x, x])
+        t, x = (np.concatenate([self._t, t_ns]), np.concatenate([self._x, x])) if self._t.size else (t_ns, x)
         self._t, self._x = t[-1:].copy(), x[-1:].copy()
         if not self._is_awake:
             self._wake(t, x)
@@ -282,18 +282,18 @@ class StandWatch:
         dt = np.diff(t_ns, prepend=t_last)
         self._driving_ns += int(dt[(v > _SPEED[1]) & (dt <= _PAUSE_NS)].sum())
         self._low, self._high = min(self._low, float(v.min())), max(self._high, float(v.max()))
-        is_sound = np.abs(np.diff(v, prepend=v_last)) <= _STOPPING * dt * 1e-9 + _SLACK
         stands = v <= _STANDING
         self.has_moved |= not bool(stands.all())
         before = np.append(self._since is not None, stands[:-1])
         for k in np.flatnonzero((stands != before) | (dt > _PAUSE_NS)).tolist():
+            is_sound = abs(v[k] - (v[k - 1] if k else v_last)) <= _STOPPING * dt[k] * 1e-9 + _SLACK
             if before[k]:
                 assert self._since is not None
-                if self._is_sound and (stands[k] or is_sound[k]):  # reached and left as a car stops and starts
+                if self._is_sound and (stands[k] or is_sound):  # reached and left as a car stops and starts
                     self._found.append((self._since, int(t_ns[k - 1]) if k else t_last))
                 self._since = None
             if stands[k]:
-                self._since, self._is_sound = int(t_ns[k]), bool(is_sound[k])
+                self._since, self._is_sound = int(t_ns[k]), bool(is_sound)
         self._last = int(t_ns[-1]), float(v[-1])
 
     def finish(self) -> tuple[Stretch, ...]:

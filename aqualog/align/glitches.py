@@ -92,8 +92,7 @@ def sensor_glitches(t_ns: TimeArray, omega: FloatArray, *, r_e: float) -> BoolAr
     if omega.size < 3:
         return glitch
     v = omega * r_e
-    leaps = np.flatnonzero(is_leap(np.diff(t_ns), np.diff(v)))
-    jumps = [i for i in leaps.tolist() if not _is_of_the_stamps(t_ns, v, i)]
+    jumps = [i for i in _jumps(t_ns, v, RIM_LIMIT, _SLACK) if not _is_of_the_stamps(t_ns, v, i)]
     done = -1
     for position, i in enumerate(jumps):
         if i < done:
@@ -126,7 +125,7 @@ def spikes(t_ns: TimeArray, x: FloatArray, *, leap: Leap = _ACCELERATION) -> Boo
     spike = np.zeros(x.size, dtype=np.bool_)
     if x.size < 3:
         return spike
-    jumps = np.flatnonzero(np.abs(np.diff(x)) > leap.rate * np.diff(t_ns) * 1e-9 + leap.step).tolist()
+    jumps = _jumps(t_ns, x, leap.rate, leap.step)
     done = -1
     for position, i in enumerate(jumps):
         if i < done:
@@ -137,6 +136,14 @@ def spikes(t_ns: TimeArray, x: FloatArray, *, leap: Leap = _ACCELERATION) -> Boo
                 done = j + 1
                 break
     return spike
+
+
+def _jumps(t_ns: TimeArray, x: FloatArray, rate: float, step: float) -> list[int]:
+    """Return the samples (n,) behind which x changes by more than `rate` [1/s] x sample time + `step`."""
+    dt_ns, dx = np.diff(t_ns), np.diff(x)
+    if max(np.fmax.reduce(dx), -np.fmin.reduce(dx)) <= rate * dt_ns.min() * 1e-9 + step:  # as in most signals
+        return []
+    return np.flatnonzero(np.abs(dx) > rate * dt_ns * 1e-9 + step).tolist()
 
 
 def _soon_after(jumps: Sequence[int], position: int, t_ns: TimeArray, span_ns: int) -> Iterator[int]:
@@ -157,8 +164,11 @@ def lost_speed(t_ns: TimeArray, v: FloatArray) -> BoolArray:
     lost = np.zeros(v.size, dtype=np.bool_)
     if v.size < 2:
         return lost
+    is_zero = v[1:] == 0.0
+    if not is_zero.any():
+        return lost
     is_live = np.append(True, v[1:-1] != v[:-2])
-    falls = (v[1:] == 0.0) & is_live & (np.abs(v[:-1]) > _STOPPING * np.diff(t_ns) * 1e-9 + _STANDS_BELOW)
+    falls = is_zero & is_live & (np.abs(v[:-1]) > _STOPPING * np.diff(t_ns) * 1e-9 + _STANDS_BELOW)
     ends = np.append(np.flatnonzero(v != 0.0), v.size)
     for i in np.flatnonzero(falls).tolist():
         lost[i + 1 : ends[np.searchsorted(ends, i + 1)]] = True

@@ -89,12 +89,11 @@ def linear(
     bridged : bool array (m,)
         Grid points inside an interval of more than 1.5 median sample times: a sample was missing there.
     """
-    y = np.full(grid_ns.size, np.nan)
     bridged = np.zeros(grid_ns.size, dtype=bool)
     if t_ns.size == 0:
-        return y, bridged
+        return np.full(grid_ns.size, np.nan), bridged
     right, exact, between, span, share = at or placed(t_ns, grid_ns)
-    y[exact] = x[right[exact]]
+    y = np.where(exact, x.take(right, mode="clip"), np.nan)
     i = right[between]
     values = x[i - 1] + share * (x[i] - x[i - 1])
     y[between] = np.where(span <= gap_ns, values, np.nan)

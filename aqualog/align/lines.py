@@ -72,7 +72,7 @@ class LineWatch:
             return
         if self._first_ns is None:
             self._first_ns = int(t_ns[0])
-        t, x = np.concatenate([self._t, t_ns]), np.concatenate([self._x, x])
+        t, x = (np.concatenate([self._t, t_ns]), np.concatenate([self._x, x])) if self._t.size else (t_ns, x)
         start = _starts(t, self._first_ns)
         whole = int(start[-1])
         self._t, self._x = t[whole:].copy(), x[whole:].copy()

@@ -16,16 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.align.evidence import (
-    CHECKS,
-    Known,
-    Proposal,
-    quantity_of,
-    settle_by_range,
-    speed_unit,
-    to_si,
-    with_unit,
-)  # fmt: skip
+from aqualog.align.evidence import CHECKS, Known, Proposal, quantity_of, settle_by_range, speed_unit, to_si, with_unit
 from aqualog.align.guess_units import CHOICES, by_range
 from aqualog.align.mapping import Entry, channel_id
 from aqualog.align.motion import Motion, derivative, even_times, fit, on_grid, smooth, track, wheel_turn

@@ -204,7 +204,7 @@ def build_signals(
         If no signal is usable, units do not fit, or the sources' clocks cannot be joined.
     """
     repairs: dict[str, ClockRepair] = {}
-    span = OfLast(span_of)  # channels of one group share their stamps
+    span = OfLast(span_of)  # channels of one group have the same stamps
     samples: dict[str, Samples] = {}
 
     def take(cleaners: Mapping[str, Cleaner]) -> dict[str, Taken]:
@@ -216,8 +216,7 @@ def build_signals(
             is_changed = faults.back_steps or faults.duplicates or faults.strays
             raw = channel.values[order] if is_changed else channel.values
             samples[name] = cleaner.push(t_ns, raw, is_last=True)
-            every, t_used = span(t_ns), samples[name][0]
-            used = every if t_used is t_ns else span_of(t_used)
+            every, used = span(t_ns), span(samples[name][0])
             taken[name] = Taken(channel.values.size, every, used, faults, channel.absolute)
         return taken
 

@@ -14,6 +14,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from typing import Any, Generic, TypeVar
 
@@ -41,17 +42,19 @@ _MOST_AGAIN = 20_000  # samples that are looked at
 
 
 class OfLast(Generic[_Value]):
-    """A function of one array that is called repeatedly with the same, unchanged object; the last answer is kept."""
+    """A function of one array; the answers for the last three are kept, and serve all arrays of the same content."""
 
     def __init__(self, function: Callable[[NDArray[Any]], _Value]) -> None:
         self._function = function
-        self._last: tuple[NDArray[Any], _Value] | None = None
+        self._last: deque[tuple[NDArray[Any], _Value]] = deque(maxlen=3)
 
     def __call__(self, array: NDArray[Any]) -> _Value:
-        """Return the answer for this array, from before if it is the same object."""
-        if self._last is None or self._last[0] is not array:
-            self._last = (array, self._function(array))
-        return self._last[1]
+        """Return the answer for this array, which stays unchanged."""
+        for known, answer in self._last:
+            if known is array or np.array_equal(known, array):
+                return answer
+        self._last.append((array, self._function(array)))
+        return self._last[-1][1]
 
 
 class ClockRepair:

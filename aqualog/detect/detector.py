@@ -78,12 +78,8 @@ def always_partial(_: Mapping[str, Any]) -> str:
     return "partial"
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
-    """A track of one piece, and the evidence from which its events are made."""
-
-    track: Track
-    evidence: Evidence
+Found = tuple[Track, Evidence]
+"""A track of one piece, and the evidence from which its events are made."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +132,7 @@ class Scene:
 
     def after(self, output: Output) -> Scene:
         """Return what the next detector sees."""
-        tracks = (*self.tracks, *(x.track for x in output.found))
+        tracks = (*self.tracks, *(track for track, _ in output.found))
         shared = {**self.shared, **output.shared}
         return Scene({**self.f, **output.features}, self.braking, self.columns, tracks, shared)
 

@@ -90,16 +90,16 @@ class _Builder:
         """Return events that end within this piece."""
         closed: list[Event] = []
         self._note_gaps(np.isnan(statistic))
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], bits, [False]]).astype(np.int8)))
-        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        runs = _runs(bits)
+        for begin, end in runs:
             if begin > 0:
                 closed += self._close(self._offset)
             if self._open is None:
-                self._open = _Open(self._offset + int(begin))
+                self._open = _Open(self._offset + begin)
             self._open.gather(slice(begin, end), statistic, evidence)
             if end < bits.size:
-                closed += self._close(self._offset + int(end))
-        if bits.size and not bits[0] and edges.size == 0:
+                closed += self._close(self._offset + end)
+        if bits.size and not runs:
             closed += self._close(self._offset)
         self._offset += bits.size
         return closed
@@ -111,11 +111,10 @@ class _Builder:
     def _note_gaps(self, lacks: BoolArray) -> None:
         oldest = (self._offset if self._open is None else self._open.start) - REACH_S * 1e9 / self._dt_ns
         self._gaps = [g for g in self._gaps if g[1] >= oldest]
-        edges = self._offset + np.flatnonzero(np.diff(np.concatenate([[False], lacks, [False]]).astype(np.int8)))
-        for begin, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-            is_one = self._gaps and self._gaps[-1][1] == begin
-            first = self._gaps.pop()[0] if is_one else begin
-            self._gaps.append((first, end))
+        for begin, end in _runs(lacks):
+            is_one = self._gaps and self._gaps[-1][1] == self._offset + begin
+            first = self._gaps.pop()[0] if is_one else self._offset + begin
+            self._gaps.append((first, self._offset + end))
 
     def _gap_s(self, at_s: float) -> tuple[float, float]:
         """The gap that a moment lies within, or that moment twice. [s]"""
@@ -138,6 +137,14 @@ class _Builder:
                 cause_s=(min(cause_start, cause_end), cause_end),
             )
         ]  # fmt: skip
+
+
+def _runs(bits: BoolArray) -> list[tuple[int, int]]:
+    """Return the first sample of each run of set bits (n,), and the first one behind."""
+    if not bits.any():  # as in most pieces
+        return []
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], bits, [False]]).astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 class EventBook:

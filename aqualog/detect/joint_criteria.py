@@ -15,7 +15,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, other_surface
 from aqualog.detect.braking import began_free, hold_on, lasting
 from aqualog.detect.cusum import CusumParams
-from aqualog.detect.detector import Detector, Found, Needs, Output, Scene, Setup, missing_wheels, traction
+from aqualog.detect.detector import Detector, Needs, Output, Scene, Setup, missing_wheels, traction
 from aqualog.detect.events import AFTER
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import LEVEL, MEASURE, RESISTANCE
@@ -164,7 +164,7 @@ class JointCriteriaWatch:
         features["joint_gate"] = gate.astype(np.float64)
         features[FULL] = found.is_full.astype(np.float64)
         shared = {GATE: gate, GATE_AFTER: after, MAY_BE_WATER: slope, ROTATES: rotates}
-        return Output((Found(track, evidence),), features, shared)
+        return Output(((track, evidence),), features, shared)
 
     def _may_be_water(self, scene: Scene, x: FloatArray) -> BoolArray:
         slopes = scene.of(SLIP_SLOPE_DROP)

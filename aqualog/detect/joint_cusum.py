@@ -10,7 +10,7 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect import cusum
 from aqualog.detect.braking import hold_on
-from aqualog.detect.detector import Detector, Found, JointCusumParams, Output, Scene, Setup
+from aqualog.detect.detector import Detector, JointCusumParams, Output, Scene, Setup
 from aqualog.detect.events import AFTER
 from aqualog.detect.joint_criteria import (
     FULL,
@@ -108,7 +108,7 @@ class JointCusumWatch:
             AFTER: ("last", scene.shared[GATE_AFTER]),
         }
         track = self._setup.track(np.where(known, total, np.nan), active)
-        return Output((Found(track, evidence),), {f"joint_term_{name}": part for name, part in parts.items()})
+        return Output(((track, evidence),), {f"joint_term_{name}": part for name, part in parts.items()})
 
     def _variance_sum(self, scene: Scene) -> FloatArray:
         sums = []

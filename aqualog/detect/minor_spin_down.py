@@ -12,17 +12,7 @@ from aqualog.core.compiled import compiled
 from aqualog.core.notation import SIDES
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.detector import (
-    Detector,
-    Found,
-    Needs,
-    Output,
-    Scene,
-    Setup,
-    missing_drivetrain,
-    missing_wheels,
-    too_slow,
-)
+from aqualog.detect.detector import Detector, Needs, Output, Scene, Setup, missing_drivetrain, missing_wheels, too_slow
 from aqualog.detect.ewvar import EwvarParams, from_seconds
 from aqualog.detect.ewvar import step as ewvar_step
 from aqualog.detect.spin import wheel_evidence
@@ -183,7 +173,7 @@ class MinorWatch:
     def push(self, scene: Scene) -> Output:
         """Take the next piece: a track per side. [(m/s²)^2]"""
         f = scene.f
-        found: list[Found] = []
+        found = []
         features: dict[str, FloatArray] = {}
         with np.errstate(invalid="ignore"):
             is_upright = ~(np.abs(f["a_y_slow"]) > A_Y_MINOR)
@@ -199,7 +189,7 @@ class MinorWatch:
             )  # fmt: skip
             features |= {f"variance_{watched}": var, f"variance_{other}": var - delta}
             evidence = {**wheel_evidence(scene, watched, f.get(f"mu_{watched}")), "variance_max": ("max", var)}
-            found.append(Found(self._setup.track(delta, bits, wheel=watched), evidence))
+            found.append((self._setup.track(delta, bits, wheel=watched), evidence))
         return Output(tuple(found), features)
 
 

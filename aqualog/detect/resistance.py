@@ -13,7 +13,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum
 from aqualog.detect.braking import hold_on
 from aqualog.detect.cusum import CusumParams
-from aqualog.detect.detector import Detector, Found, Needs, Output, Scene, Setup, missing_balance, too_slow
+from aqualog.detect.detector import Detector, Needs, Output, Scene, Setup, missing_balance, too_slow
 from aqualog.detect.events import AFTER, SINCE
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
@@ -134,7 +134,7 @@ class ResistanceWatch:
             SINCE: ("first", np.minimum(since, LATEST)),
             AFTER: ("last", after),
         }
-        return Output((Found(self._setup.track(g, bits), evidence),), features, {MEASURE: x})
+        return Output(((self._setup.track(g, bits), evidence),), features, {MEASURE: x})
 
 
 def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:

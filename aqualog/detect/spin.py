@@ -19,7 +19,6 @@ from aqualog.detect.cusum import CusumParams
 from aqualog.detect.cusum import step as cusum_step
 from aqualog.detect.detector import (
     Detector,
-    Found,
     Needs,
     Output,
     Scene,
@@ -180,7 +179,7 @@ class SpinWatch:
                 self._params, self._states[wheel], f[f"a_w_delta_{wheel}"], f[f"v_w_delta_{wheel}"], f["v_x_hat"],
                 allowed,
             )  # fmt: skip
-            found.append(Found(self._setup.track(g, bits, wheel=wheel), wheel_evidence(scene, wheel, mu)))
+            found.append((self._setup.track(g, bits, wheel=wheel), wheel_evidence(scene, wheel, mu)))
         return Output(tuple(found))
 
 

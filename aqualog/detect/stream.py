@@ -97,8 +97,8 @@ class DriveStream:
         events: list[Event] = []
         for detector, watch in self.watches.items():
             output = watch.push(scene)
-            for found in output.found:
-                events += self._book.take(found.track, found.evidence, detector.severity, detector.explain)
+            for track, evidence in output.found:
+                events += self._book.take(track, evidence, detector.severity, detector.explain)
             scene = scene.after(output)
         return Piece(scene.f, scene.tracks, tuple(events))
 

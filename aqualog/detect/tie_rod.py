@@ -94,7 +94,7 @@ class TieRodWatch:
             f"{stem}_max": ("max", residual),
             "from_steering_torque": ("any", np.full(z.size, section != "tie_rod")),
         }
-        return Found(self._setup.track(g, bits, wheel=wheel), evidence)
+        return self._setup.track(g, bits, wheel=wheel), evidence
 
 
 def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:

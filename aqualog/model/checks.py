@@ -5,7 +5,7 @@ from __future__ import annotations
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.model.term import Check
 
-__all__ = ["JACKED", "ROLLED", "STANDSTILL"]
+__all__ = ["JACKED", "ROLLED", "STANDSTILL", "WEIGHED"]
 
 _EACH = (None, *AXLES, *WHEELS)
 
@@ -19,3 +19,4 @@ JACKED = Check(
 ROLLED = Check(  # 2 cm and the load's share of ten turns, 20 m
     "rolled_distance", "Roll the car ten turns of each wheel and measure the way", 20.0, _EACH, "delta", 0.002
 )
+WEIGHED = Check("weighing", "Weigh the car as it was driven", 30.0, (None,), "delta_mass", 10.0)

@@ -16,21 +16,10 @@ import numpy as np
 from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
-from aqualog.model.checks import JACKED, ROLLED, STANDSTILL
+from aqualog.model.checks import JACKED, ROLLED, STANDSTILL, WEIGHED
 from aqualog.model.plant import Plant, with_mass_at
 from aqualog.model.sensors import Channel
-from aqualog.model.term import (
-    CampaignSearch,
-    Check,
-    DayToDay,
-    DriveSearch,
-    Effect,
-    Knots,
-    Need,
-    Parameter,
-    Setup,
-    Table,
-)
+from aqualog.model.term import CampaignSearch, DayToDay, DriveSearch, Effect, Knots, Need, Parameter, Setup, Table
 from aqualog.physics.load import G
 
 __all__ = ["EFFECTS", "EMPIRICAL", "wheels_at"]
@@ -268,8 +257,7 @@ _ALL = [
         (Parameter("delta_mass", "kg", 0.0, 100.0, -500.0, 3000.0, 20.0, "at the place",
             DayToDay("inertia", _as_mass, "mass")),), _on_plant(_payload),
         ("f", "r"), twins=("torque_gain",),
-        drive=DriveSearch((_TORQUE,), places=(None, "f", "r"), is_single=True,
-            check=Check("weighing", "Weigh the car as it was driven", 30.0, (None,), "delta_mass", 10.0)),
+        drive=DriveSearch((_TORQUE,), places=(None, "f", "r"), is_single=True, check=WEIGHED),
         less="The car weighed {delta_mass:.0f} kg less than the vehicle file says.", belongs="drive",
     ),
     Effect(

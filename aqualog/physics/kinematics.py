@@ -32,7 +32,7 @@ def kinematic_steer_angle(yaw_rate: FloatArray, v_x: FloatArray, *, wheelbase: f
 
 
 def centre_line_speed(
-    v_rim: FloatArray, yaw_rate: FloatArray, steer_angle: FloatArray, *, y: float, wheelbase: float
+    v_rim: FloatArray, yaw_rate: FloatArray, steer_angle: FloatArray, *, y: FloatArray | float, wheelbase: float
 ) -> FloatArray:
     """Speed that the vehicle's centre line has if a wheel at its side rolls without slip.
 
@@ -47,8 +47,8 @@ def centre_line_speed(
         Left positive. [rad/s]
     steer_angle : array (n,)
         Road-wheel angle of this wheel, left positive; 0 for an unsteered rear wheel. [rad]
-    y : float
-        Lateral position of the wheel, left positive. [m]
+    y : array or float
+        Lateral position of the wheel, left positive; (k, 1) of k wheels with `v_rim` (k, n). [m]
     wheelbase : float
         Distance of the axles; the rear axle is taken to move straight ahead in the vehicle's frame, which costs
         less than 0.5 % of speed at 1 g. [m]

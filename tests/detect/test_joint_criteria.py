@@ -45,10 +45,10 @@ def watched(detector, seen, settings=None, threshold=None):
     """Track, event at the end of the drive (or None), and features of one piece."""
     setup = Setup(detector, CAR, DT, threshold or detector.threshold, settings or Settings())
     output = detector.start(setup).push(seen)
-    (found,) = output.found
+    ((found, evidence),) = output.found
     book = EventBook(10_000_000)
-    book.take(found.track, found.evidence, detector.severity, detector.explain)
-    return found.track, next(iter(book.finish()), None), output.features
+    book.take(found, evidence, detector.severity, detector.explain)
+    return found, next(iter(book.finish()), None), output.features
 
 
 def warned(criteria, gate, *, slope=True):

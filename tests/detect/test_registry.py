@@ -123,7 +123,7 @@ NEW = '''
 
 import numpy as np
 
-from aqualog.detect.detector import Detector, Found, Needs, Output
+from aqualog.detect.detector import Detector, Needs, Output
 
 
 class Watch:
@@ -133,7 +133,7 @@ class Watch:
     def push(self, scene):
         loud = scene.f["v_x_hat"]
         track = self.setup.track(loud, loud > self.setup.threshold)
-        return Output((Found(track, {"v_x": ("first", loud)}),), {"loudness": loud})
+        return Output(((track, {"v_x": ("first", loud)}),), {"loudness": loud})
 
 
 LOUDNESS = Detector(

@@ -59,9 +59,9 @@ def test_a_car_that_spins_round_has_no_spin_up(yaw_rate, begins):
     watch = SpinWatch(Setup(SPIN_UP, SEDAN, 0.01, 0.6), sign=1.0)
     scene = Scene(f, dict.fromkeys(WHEELS, one < 0))
     found = watch.push(scene).found
-    assert [x.track.active.any() for x in found] == [begins, begins]
+    assert [track.active.any() for track, _ in found] == [begins, begins]
     # nor does a wheel that has not begun one count in the sum
-    bare = tuple(replace(x.track, active=one < 0) for x in found)
+    bare = tuple(replace(track, active=one < 0) for track, _ in found)
     more = {"delta_a_x": one, "criterion_full": one}
     shared = {MEASURE: one, GATE: one > 0, GATE_AFTER: one, MAY_BE_WATER: one > 0, ROTATES: one < 0}
     output = JOINT_CUSUM.start(Setup(JOINT_CUSUM, SEDAN, 0.01, 1.0)).push(

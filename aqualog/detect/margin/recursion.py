@@ -35,7 +35,7 @@ _NV, _NX, _NN = FULL_SPEEDS.size, len(FEATURES), NODES.size
 _LOG = np.log(FULL_SPEEDS)
 _QUANTILES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 _UNKNOWN = 1e4  # variance of a feature that is missing
-_V, _A, _R, _D, _U_F, _U_R, _VAR = 0, 1, 2, 3, 5, 7, 9  # columns of a step
+_V, _A, _R, _D, _U_F, _U_R, _VAR, _S_F, _S_R = 0, 1, 2, 3, 5, 7, 9, 11, 13  # columns of a step
 _LEAST = 1e-10  # of a slip's variance
 
 
@@ -73,10 +73,9 @@ def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
         g = m.sides[i]
         g[2] = min(g[2] + p.walk_D**2 * p.dt, p.offset_D**2)
         g[4] = min(g[4] + p.walk_share**2 * p.dt, p.share_D**2)
-        if math.isnan(row[_D + i] + row[_U_F + i] + row[_U_R + i]):
+        front, rear = row[_S_F + i], row[_S_R + i]
+        if math.isnan(row[_D + i] + front + rear):
             continue
-        front = _slip(row[_U_F + i], p.slope_f, p.rolling, p.friction)
-        rear = _slip(row[_U_R + i], p.slope_r, p.rolling, p.friction)
         away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
         _learn_line(g, front + rear, away, p.noise_D**2 + row[_VAR + i], trust)
 
@@ -107,10 +106,9 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
         n, e, e2, h, within = 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(ROWS):
             row = m.window[k]
-            if math.isnan(row[_D + i] + row[_U_F + i] + row[_U_R + i]):
+            front, rear = row[_S_F + i], row[_S_R + i]
+            if math.isnan(row[_D + i] + front + rear):
                 continue
-            front = _slip(row[_U_F + i], p.slope_f, p.rolling, p.friction)
-            rear = _slip(row[_U_R + i], p.slope_r, p.rolling, p.friction)
             away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
             n, e, e2, h, within = n + 1.0, e + away, e2 + away * away, h + front + rear, within + row[_VAR + i]
         x[1 + i], P[1 + i], x[3 + i], P[3 + i] = 0.0, _UNKNOWN, 0.0, _UNKNOWN
@@ -127,32 +125,40 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
     return traction / max(steps, 1.0), more
 
 
-@part
-def _score(mean, scatter, z, x, P, tail, A, y):  # type: ignore[no-untyped-def]
-    """Log likelihood of the features x by Student's law, of a mean by covariates z and a covariance; A, y scratch.
+@partial(part, is_inline=False)  # from two places: its code once
+def _scores(mean, scatter, z, x, P, tail, A, y, score):  # type: ignore[no-untyped-def]
+    """Fill log likelihoods (k,) of the features x by Student's law, of means by covariates z and covariances.
 
-    The covariance is A D A', with ones and 1 / D on the diagonal of A: no roots, and one logarithm.
+    `mean` (features, covariates, k), `scatter` (features, features, k): the compiler makes vectors of the innermost
+    loops, over k. A covariance is A D A', with ones and 1 / D on the diagonal of A: no roots, and one logarithm.
     """
-    determinant, square = 1.0, 0.0
+    n, determinant, square = score.size, y[_NX], y[_NX + 1]
+    determinant[:] = 1.0
+    square[:] = 0.0
     for i in range(_NX):
-        left = x[i]
+        for k in range(n):
+            y[i, k] = x[i]
+            A[i, i, k] = scatter[i, i, k] + P[i]
         for c in range(COVARIATES):
-            left -= mean[i, c] * z[c]
-        S = scatter[i, i] + P[i]
+            for k in range(n):
+                y[i, k] -= mean[i, c, k] * z[c]
         for j in range(i):
-            AD = scatter[i, j]
-            for k in range(j):
-                AD -= A[k, i] * A[j, k]
-            A[j, i] = AD
-            A[i, j] = AD * A[j, j]
-            S -= AD * A[i, j]
-            left -= A[i, j] * y[j]
-        S = max(S, 1e-9)
-        A[i, i] = 1.0 / S
-        y[i] = left
-        determinant *= S
-        square += left * left * A[i, i]
-    return -0.5 * math.log(determinant) - 0.5 * (tail + _NX) * math.log1p(square / tail)
+            for k in range(n):
+                A[j, i, k] = scatter[i, j, k]
+            for q in range(j):
+                for k in range(n):
+                    A[j, i, k] -= A[q, i, k] * A[j, q, k]
+            for k in range(n):
+                A[i, j, k] = A[j, i, k] * A[j, j, k]
+                A[i, i, k] -= A[j, i, k] * A[i, j, k]
+                y[i, k] -= A[i, j, k] * y[j, k]
+        for k in range(n):
+            S = max(A[i, i, k], 1e-9)
+            determinant[k] *= S
+            A[i, i, k] = 1.0 / S
+            square[k] += y[i, k] * y[i, k] * A[i, i, k]
+    for k in range(n):
+        score[k] = -0.5 * math.log(determinant[k]) - 0.5 * (tail + _NX) * math.log1p(square[k] / tail)
 
 
 @part
@@ -199,16 +205,16 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
             w[law, i] /= total
 
 
-@partial(part, allocates=True)
-def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
+@part
+def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
     """Let the window speak: probabilities of the kinds of road, evidence on the full speeds."""
-    z = np.array([1.0, math.log(v / 30.0), math.asinh(traction / 0.02)])
-    known = np.array([1.0, z[1], min(z[2], p.most_u)])
-    A, y = np.empty((_NX, _NX)), np.empty(_NX)
-    score = np.empty(m.kinds.size)
+    z, known, P, A, y, score, nodes, _ = s
+    z[0], z[1], z[2] = 1.0, math.log(v / 30.0), math.asinh(traction / 0.02)
+    known[0], known[1], known[2] = 1.0, z[1], min(z[2], p.most_u)
+    _scores(t.kind_mean, t.kind_scatter, known, m.x[0], m.x[1], p.tail, A, y, score)
     best = -1e300
     for k in range(score.size):
-        score[k] = p.weight * _score(t.kind_mean[k], t.kind_scatter[k], known, m.x[0], m.x[1], p.tail, A, y)
+        score[k] = p.weight * score[k]
         best = max(best, score[k])
     total = 0.0
     for k in range(score.size):
@@ -217,16 +223,19 @@ def _judge(p, t, m, v, traction):  # type: ignore[no-untyped-def]
     for k in range(score.size):
         m.kinds[k] /= total
     # how much drag and shake belong to a distance differs from law to law more than what is learnt
-    P = m.x[1] + np.array([p.law_R**2, 0.0, 0.0, p.law_M**2, p.law_M**2])
-    nodes = np.zeros(_NN)
+    _copy(m.x[1], P)
+    P[0], P[3], P[4] = P[0] + p.law_R**2, P[3] + p.law_M**2, P[4] + p.law_M**2
     keep, log_v, heard = math.exp(-p.dt / p.keep_s), math.log(v), _is(t, m, 1) > p.heard
-    for law in range(t.law.size):
-        if heard:
-            for n in range(_NN):
-                nodes[n] = p.weight * _score(t.mean[law, n], t.scatter[law, n], z, m.x[0], P, p.tail, A, y)
-        for i in range(_NV):
-            n, a = _place(log_v, i)
-            m.evidence[law, i] = keep * m.evidence[law, i] + (1.0 - a) * nodes[n] + a * nodes[n + 1]
+    if heard:
+        _scores(t.mean, t.scatter, z, m.x[0], P, p.tail, A, y, nodes)
+    for i in range(_NV):
+        n, a = _place(log_v, i)
+        for law in range(t.law.size):
+            m.evidence[law, i] *= keep
+            if heard:
+                at = law * _NN + n
+                below, above = p.weight * nodes[at], p.weight * nodes[at + 1]
+                m.evidence[law, i] = m.evidence[law, i] + (1.0 - a) * below + a * above
 
 
 @part
@@ -272,9 +281,12 @@ def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
     m.out[8] = m.out[4] + v
 
 
-@compiled
-def _step(p, t, m, row):  # type: ignore[no-untyped-def]
+@part
+def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
     """Take the means of one step; fill `m.out`."""
+    for i in range(2):
+        row[_S_F + i] = _slip(row[_U_F + i], p.slope_f, p.rolling, p.friction)
+        row[_S_R + i] = _slip(row[_U_R + i], p.slope_r, p.rolling, p.friction)
     at = int(m.samples[1]) % ROWS
     m.samples[1] += 1.0
     v = row[_V]
@@ -286,7 +298,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     _copy(row, m.window[at])
     _predict(p, t, m)
     traction, more = _gather(p, m)
-    w = np.empty((t.law.size, _NV))
+    w = s[7]
     speed = max(v, p.v_least)
     x, P = m.x[0], m.x[1]
     own, known = (x[3], x[4]), (P[3] < _UNKNOWN, P[4] < _UNKNOWN)
@@ -295,7 +307,7 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
             x[a], x[a + 1] = x[a + 1], x[a]
             P[a], P[a + 1] = P[a + 1], P[a]
     if v > p.v_least:
-        _judge(p, t, m, speed, traction)
+        _judge(p, t, m, speed, traction, s)
     _weights(p, t, m, speed, w)
     wet, dry = _is(t, m, 1), _is(t, m, 0)
     for i in range(2):
@@ -308,12 +320,10 @@ def _step(p, t, m, row):  # type: ignore[no-untyped-def]
     _fill(p, t, m, v, w, wet)
 
 
-@compiled
-def _scan(p, t, m, x):  # type: ignore[no-untyped-def]
-    n = x[0].size
-    out = np.empty((m.out.size, n))
-    row = np.empty(m.window.shape[1])
-    for i in range(n):
+@part
+def _push(p, t, m, x, out, row, s):  # type: ignore[no-untyped-def]
+    """Take samples (9, n) one by one, and fill the rows of what is put out."""
+    for i in range(x.shape[1]):
         for c in range(9):
             value = x[c, i]
             if not math.isnan(value):
@@ -331,10 +341,24 @@ def _scan(p, t, m, x):  # type: ignore[no-untyped-def]
             m.sums[:] = 0.0
             m.samples[0] = 0.0
             if not math.isnan(row[_V]):
-                _step(p, t, m, row)
+                _step(p, t, m, row, s)
             else:
                 m.out[:] = math.nan
-        _copy(m.out, out[:, i])
+        for k in range(m.out.size):
+            out[k, i] = m.out[k]
+
+
+@compiled
+def _scan(p, t, m, x):  # type: ignore[no-untyped-def]
+    out = np.empty((m.out.size, x.shape[1]))
+    kinds, nodes = m.kinds.size, t.law.size * _NN
+    most = max(kinds, nodes)
+    # what a step works with and none remembers: parts that allocate nothing count no references
+    s = (
+        np.empty(COVARIATES), np.empty(COVARIATES), np.empty(_NX), np.empty((_NX, _NX, most)),
+        np.empty((_NX + 2, most)), np.empty(kinds), np.empty(nodes), np.empty((t.law.size, _NV)),
+    )  # fmt: skip
+    _push(p, t, m, x, out, np.empty(m.window.shape[1]), s)
     return out
 
 
@@ -344,4 +368,4 @@ def scan(p: FilterParams, emissions: Emissions, state: Filter, inputs: Inputs) -
     The rows hold from one step, a tenth of a second, to the next.
     """
     after = state.copy()
-    return _scan(p, emissions, after, np.array(inputs, dtype=np.float64)), after
+    return _scan(p, emissions.in_columns(), after, np.array(inputs, dtype=np.float64)), after

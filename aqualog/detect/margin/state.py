@@ -26,7 +26,7 @@ COVARIATES = 3  # 1, log of the speed, traction
 OUTPUTS = ("p_water", "p_near", "low", "q25", "median", "q75", "high", "contact", "v_full")
 """Rows of what a scan returns: probabilities [-], quantiles of the distance [m/s], contact share [-], speed [m/s]."""
 ROWS = 6  # steps of the window
-COLUMNS = 11  # means of a step: inputs, and the variance of both slips within it
+COLUMNS = 15  # means of a step: inputs, variance of both slips within it, and the slips of dry wheels by the traction
 
 
 class FilterParams(NamedTuple):
@@ -107,6 +107,12 @@ class Emissions(NamedTuple):
     kind_scatter: FloatArray
     kind_prior: FloatArray
     road: FloatArray
+
+    def in_columns(self) -> Emissions:
+        """Return the same with laws and nodes as one last index, and kinds as the last one."""
+        tables = {n: getattr(self, n) for n in ("mean", "scatter", "kind_mean", "kind_scatter")}
+        flat = {n: np.moveaxis(x.reshape(-1, *x.shape[-2:]), 0, -1) for n, x in tables.items()}
+        return self._replace(**{n: np.ascontiguousarray(x) for n, x in flat.items()})
 
 
 class Filter(NamedTuple):

@@ -11,17 +11,7 @@ from aqualog.core.notation import SIDES
 from aqualog.core.records import FloatArray, Margin, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.braking import lasting
-from aqualog.detect.detector import (
-    Detector,
-    Found,
-    Needs,
-    Output,
-    Scene,
-    Setup,
-    missing_balance,
-    missing_wheels,
-    too_slow,
-)
+from aqualog.detect.detector import Detector, Needs, Output, Scene, Setup, missing_balance, missing_wheels, too_slow
 from aqualog.detect.margin.emissions import emissions_of
 from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.recursion import scan
@@ -77,7 +67,7 @@ class MarginWatch:
         margin = features["aquaplaning_margin"]
         evidence = {"v_x": ("first", v), "margin_min": ("min", margin), "contact_min": ("min", rows["contact"])}
         track = self._setup.track(rows["p_near"], active)
-        return Output((Found(track, evidence),), {**features, "water_probability": rows["p_water"]})
+        return Output(((track, evidence),), {**features, "water_probability": rows["p_water"]})
 
 
 class Least:

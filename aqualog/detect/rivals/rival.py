@@ -18,7 +18,7 @@ import numpy as np
 from aqualog.core.compiled import compiled
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.core.vehicle import Vehicle
-from aqualog.detect.detector import Found, Needs, Output, Scene, Setup, missing_torques, missing_wheels, too_slow
+from aqualog.detect.detector import Needs, Output, Scene, Setup, missing_torques, missing_wheels, too_slow
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = ["MIN_RATE", "WholeDrive", "alarm_bits", "needs_slip", "needs_wheels"]
@@ -38,7 +38,7 @@ class WholeDrive:
 
     def push(self, scene: Scene) -> Output:
         """Take the whole drive."""
-        return Output(tuple(Found(t, _evidence(scene, t)) for t in self._run(scene, self._setup)))
+        return Output(tuple((t, _evidence(scene, t)) for t in self._run(scene, self._setup)))
 
 
 def _evidence(scene: Scene, track: Track) -> dict[str, Any]:

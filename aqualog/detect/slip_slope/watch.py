@@ -13,17 +13,7 @@ from aqualog.core.records import BoolArray, FloatArray, SlopeSummary, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import ewvar
 from aqualog.detect.braking import hold_on
-from aqualog.detect.detector import (
-    Detector,
-    Found,
-    Needs,
-    Output,
-    Scene,
-    Setup,
-    missing_torques,
-    missing_wheels,
-    too_slow,
-)
+from aqualog.detect.detector import Detector, Needs, Output, Scene, Setup, missing_torques, missing_wheels, too_slow
 from aqualog.detect.slip_slope import activation, drop, estimator
 from aqualog.detect.slip_slope.drop import THRESHOLD
 from aqualog.detect.slip_slope.estimator import BLIND, ESTIMATING, FROZEN, INACTIVE, STATUS, Estimate
@@ -246,7 +236,7 @@ class DropWatch:
     def push(self, scene: Scene) -> Output:
         """Take the next piece: a track per pair, the lost share of the dry slope. [-]"""
         f = scene.f
-        found: list[Found] = []
+        found = []
         features: dict[str, FloatArray] = {}
         for watch in self.watches:
             seen = watch.push(f, scene.braking, f["yaw_rate_slow"])
@@ -262,7 +252,7 @@ class DropWatch:
             }
             name, unit = self._setup.detector.name, self._setup.detector.unit
             track = Track(name, watch.pair.wheel, place, unit, seen.loss, watch.drop_threshold, seen.active)
-            found.append(Found(track, evidence))
+            found.append((track, evidence))
         return Output(tuple(found), features)
 
 
