@@ -87,7 +87,8 @@ class SpanWatch:
 
     def _add(self, steps: TimeArray) -> None:
         assert self._median is not None
-        steps = steps[steps < _BURST * self._median]
+        if steps.max(initial=0) >= _BURST * self._median:
+            steps = steps[steps < _BURST * self._median]
         self._total += int(steps.sum())
         self._count += steps.size
 

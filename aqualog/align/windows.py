@@ -57,7 +57,8 @@ class LongDrive:
         grid = self.plan.grid
         cleaners = cleaners_of(self._found, self._map, self.plan.vehicle, self.plan.unmeasured)
         buffers = {c.origin.symbol: _Buffer(c.origin.symbol, c.span.last_ns) for c in self.plan.cleaned}
-        source = _Source(self._parts(), self._found, {n: _InOrder(c, self._map) for n, c in cleaners.items()})
+        signals = {n: _InOrder(c, self._map, is_known=True) for n, c in cleaners.items()}
+        source = _Source(self._parts(), self._found, signals)
         for first in range(0, grid.rows, rows):
             last = min(first + rows, grid.rows)
             end_ns = grid.start_ns + (last - 1) * grid.dt_ns
@@ -115,10 +116,13 @@ def _names_of(found: Found, info: ChannelInfo) -> list[str]:
 
 
 class _InOrder:
-    """One signal that arrives piece by piece: doubled stamps are left out, and none may run backwards."""
+    """One signal that arrives piece by piece: doubled stamps are left out, and none may run backwards.
 
-    def __init__(self, cleaner: Cleaner, signal_map: SignalMap) -> None:
-        self._cleaner, self._map = cleaner, signal_map
+    `is_known`: an earlier pass has found its spans, and `taken` is not called.
+    """
+
+    def __init__(self, cleaner: Cleaner, signal_map: SignalMap, *, is_known: bool = False) -> None:
+        self._cleaner, self._map, self._is_known = cleaner, signal_map, is_known
         self._held_t: TimeArray = np.zeros(0, dtype=np.int64)  # the last sample: one with the same stamp may follow
         self._held_raw: FloatArray = np.zeros(0)
         self._every, self._used = SpanWatch(), SpanWatch()
@@ -138,13 +142,16 @@ class _InOrder:
         raw = np.concatenate([self._held_raw, channel.values])
         self._held_t, self._held_raw = t[-1:].copy(), raw[-1:].copy()
         steps = np.diff(t)
-        if (steps < 0).any():
+        shortest, longest = steps.min(initial=1), steps.max(initial=1)
+        if shortest < 0:
             raise NotInPiecesError(f"{self._cleaner.where}: time stamps out of order")
-        if (steps > DAY_NS).any():
+        if longest > DAY_NS:
             raise NotInPiecesError(f"{self._cleaner.where}: time stamps that leap")
+        if shortest > 0:
+            return self._clean(t[:-1], raw[:-1])
         same = steps == 0
         self._duplicates += int(same.sum())
-        if self._first_duplicate_ns is None and same.any():
+        if self._first_duplicate_ns is None:
             self._first_duplicate_ns = int(t[np.argmax(same)])
         return self._clean(t[:-1][~same], raw[:-1][~same])
 
@@ -153,11 +160,13 @@ class _InOrder:
         return self._clean(self._held_t, self._held_raw, is_last=True)
 
     def _clean(self, t: TimeArray, raw: FloatArray, *, is_last: bool = False) -> Samples:
-        steps = self._every.push(t)
-        is_long = steps > _SECOND
-        self._pauses += zip(steps[is_long].tolist(), (t[t.size - steps.size :] - steps)[is_long].tolist(), strict=True)
+        every = t
         if t.size or is_last:
             t, raw = self._cleaner.push(t, raw, is_last=is_last)
+        if not self._is_known:
+            steps = self._every.push(every)
+            for k in np.flatnonzero(steps > _SECOND).tolist():
+                self._pauses.append((int(steps[k]), int(every[every.size - steps.size + k] - steps[k])))
             self._used.push(t)
         return t, raw
 

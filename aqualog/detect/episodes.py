@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -63,11 +64,18 @@ class Way:
 
     def between(self, start_s: float, end_s: float) -> tuple[float, float]:
         """Return the way [m] and the seconds with a known speed."""
-        sums = np.concatenate(self._kept, axis=1)
-        self._kept = [sums]
-        t = np.arange(sums.shape[1]) * self._step * self._dt
-        metres, seconds = (float(np.interp(end_s, t, x) - np.interp(start_s, t, x)) for x in sums)
+        if len(self._kept) > 1:
+            self._kept = [np.concatenate(self._kept, axis=1)]
+        (metres, seconds) = (self._at(end_s) - self._at(start_s)).tolist()
         return metres, seconds
+
+    def _at(self, t_s: float) -> FloatArray:
+        """Both sums at a moment (2,), linear between the kept ones beside it."""
+        sums = self._kept[0]
+        at = min(max(int(t_s / (self._step * self._dt)), 1), sums.shape[1] - 1)
+        beside = np.arange(max(at - 1, 0), min(at + 2, sums.shape[1]))
+        t = beside * self._step * self._dt
+        return np.array([np.interp(t_s, t, x) for x in sums[:, beside]])
 
 
 def episodes_of(events: Sequence[Event], way: Stretch) -> tuple[Episode, ...]:
@@ -191,7 +199,7 @@ def _without_echoes(water: Sequence[_Water]) -> list[_Water]:
 
 def _last(water: Sequence[_Water], item: _Numbered) -> Sequence[_Water]:
     """The episode that has begun last before a detection, then the next one."""
-    begun = sum(w.span[0] - GAP_S < _cause(item[1])[0] for w in water)
+    begun = bisect_left(water, _cause(item[1])[0], key=lambda w: w.span[0] - GAP_S)  # starts stay in order
     return [*water[max(begun - 1, 0) : begun], *water[begun : begun + 1]]
 
 

@@ -122,7 +122,7 @@ def physical(conversion: Conversion | None, raw: _Array) -> FloatArray:
     sample that is a text is NaN.
     """
     if conversion is None:
-        return raw.astype(np.float64)
+        return raw.astype(np.float64, copy=False)
     if conversion.kind == "ranges":
         return _of_ranges(conversion, raw)
     if conversion.kind in ("texts", "texts of ranges"):

@@ -213,7 +213,7 @@ class GroupReader(OpenFile):
     def _nanoseconds(self, t: _Array) -> tuple[TimeArray, BoolArray]:
         """Time stamps in ns, and which of them are times at all."""
         usable = np.isfinite(t) & (np.abs(t) < _LATEST_S - self._start_ns * 1e-9)
-        return np.round(t[usable] * 1e9).astype(np.int64) + self._start_ns, usable
+        return np.round((t if usable.all() else t[usable]) * 1e9).astype(np.int64) + self._start_ns, usable
 
     def _count_records(self, index: int, n: int, n_bad: int) -> None:
         declared = self._groups[index].cycles

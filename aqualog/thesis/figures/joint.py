@@ -18,7 +18,7 @@ from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge, limit, limits
 from aqualog.thesis.evidence.campaign import DriveRun
 from aqualog.thesis.evidence.scenes import MANY, SOME, SceneRun, dry_and_wet, in_runs, runs, spread, stretches
-from aqualog.thesis.figures.panels import bit_panel, by_seed, feature_lines, panel, scene_figure, speed_panel
+from aqualog.thesis.figures.panels import bit_panel, by_seed, drawn_lines, panel, scene_figure, speed_panel
 from aqualog.thesis.record import Axis, Figure, Line, Note, Panel, Table, seconds
 
 __all__ = ["FIGURES", "panels_2_25"]
@@ -281,11 +281,11 @@ def panels_2_25(r: DriveRun) -> tuple[Panel, ...]:
         "threshold": (np.full(r.t.size, threshold), THRESHOLD, "dash"),
     }  # fmt: skip
     below = {"warning": (np.where(r.active("joint_cusum"), -0.15, np.nan), MUTED, "solid")}
-    warning = [replace(line, width=6.0) for line in feature_lines(r, below)]
+    warning = [replace(line, width=6.0) for line in drawn_lines(r, below)]
     return (
         speed_panel(r),
         bit_panel(r, "Criteria of joint detector 1", "criterion", bits),
-        panel(r, "Sum of joint detector 2", Axis("scaled sum"), [*feature_lines(r, lines), *warning]),
+        panel(r, "Sum of joint detector 2", Axis("scaled sum"), [*drawn_lines(r, lines), *warning]),
     )
 
 

@@ -21,8 +21,8 @@ from aqualog.thesis.record import Axis, Figure, Line, Panel, Table
 
 __all__ = [
     "ALIGNED", "FRONT", "PALETTE", "STILL", "V_KMH", "WHEEL_WORDS", "Style", "Window", "bit_panel", "by_seed", "clouds",
-    "feature_lines", "means_line", "means_table", "panel", "scene_figure", "shifts", "speed_panel", "speed_panels",
-    "spread_over", "styles", "tie_rod_panels",
+    "drawn_lines", "means_line", "means_table", "panel", "rod_forces", "scene_figure", "shifts", "speed_panel",
+    "speed_panels", "spread_over", "styles",
 ]  # fmt: skip
 
 # wheels have their own colours, so levels take these last
@@ -84,7 +84,7 @@ def _with_water(window: Window, title: str, t: Axis, y: Axis, lines: Sequence[Li
     return Panel(title, t, y, (*lines, window.water(low, high)))
 
 
-def feature_lines(r: DriveRun, lines: Mapping[str, tuple[FloatArray, str, str]]) -> list[Line]:
+def drawn_lines(r: DriveRun, lines: Mapping[str, tuple[FloatArray, str, str]]) -> list[Line]:
     """Lines by name: values (n,) of the whole drive, colour and dash."""
     w = Window.of(r)
     return [Line(n, w.t, x[w.part], colour=c, dash=dash, width=1.5) for n, (x, c, dash) in lines.items()]
@@ -93,7 +93,7 @@ def feature_lines(r: DriveRun, lines: Mapping[str, tuple[FloatArray, str, str]])
 def speed_panel(r: DriveRun, wheels: Sequence[str] = WHEELS) -> Panel:
     """Velocity and the speeds of the wheels' rims on the centre line. [m/s]"""
     lines = {WHEEL_WORDS[w]: (r.feature(f"v_w_{w}"), wheel_colour(w), "solid") for w in wheels}
-    speeds = feature_lines(r, {**lines, "velocity": (r.velocity, INK, "dash")})
+    speeds = drawn_lines(r, {**lines, "velocity": (r.velocity, INK, "dash")})
     return panel(r, "Wheel speeds and velocity", Axis("speed", "m/s"), speeds)
 
 
@@ -122,7 +122,7 @@ def bit_panel(r: DriveRun, title: str, label: str, bits: Mapping[str, tuple[floa
     return panel(r, title, Axis(label, "-", limits=(min(heights) - 0.5, max(heights) + 0.5)), lines)
 
 
-def tie_rod_panels(r: DriveRun) -> list[Panel]:
+def rod_forces(r: DriveRun) -> list[Panel]:
     """Measured and calculated forces, left and right."""
     panels = []
     for wheel, side in zip(FRONT, ("left", "right"), strict=True):
@@ -130,7 +130,7 @@ def tie_rod_panels(r: DriveRun) -> list[Panel]:
             "measured": (r.feature(f"tie_rod_meas_{wheel}"), wheel_colour(wheel), "solid"),
             "calculated": (r.feature(f"tie_rod_hat_{wheel}"), MUTED, "dash"),
         }
-        panels.append(panel(r, f"Tie rod {side}", Axis("tie-rod force", "N"), feature_lines(r, lines)))
+        panels.append(panel(r, f"Tie rod {side}", Axis("tie-rod force", "N"), drawn_lines(r, lines)))
     return panels
 
 

@@ -29,15 +29,7 @@ from aqualog.thesis.evidence.scenes import (
     spread,
     stretches,
 )
-from aqualog.thesis.figures.panels import (
-    FRONT,
-    by_seed,
-    feature_lines,
-    panel,
-    scene_figure,
-    speed_panel,
-    tie_rod_panels,
-)
+from aqualog.thesis.figures.panels import FRONT, by_seed, drawn_lines, panel, rod_forces, scene_figure, speed_panel
 from aqualog.thesis.record import Axis, Figure, Panel, Table
 
 __all__ = ["FIGURES", "panels_2_23", "rod_panels"]
@@ -102,7 +94,7 @@ def _c61(all_runs: tuple[SceneRun, ...]) -> tuple[Check, Table]:
 
 def rod_panels(r: DriveRun) -> tuple[Panel, ...]:
     """Front wheel speeds, and the forces of both tie rods."""
-    return (speed_panel(r, FRONT), *tie_rod_panels(r))
+    return (speed_panel(r, FRONT), *rod_forces(r))
 
 
 def figure_2_21() -> Figure:
@@ -310,7 +302,7 @@ def panels_2_23(r: DriveRun) -> tuple[Panel, ...]:
         "road-wheel angle in deg": (np.degrees(r.signal("steer_angle")), MUTED, "solid"),
         "lateral acceleration": (r.feature("a_y_slow"), INK, "solid"),
     }
-    return (panel(r, "Steering and lateral acceleration", _STEER, feature_lines(r, steering)), *rod_panels(r))
+    return (panel(r, "Steering and lateral acceleration", _STEER, drawn_lines(r, steering)), *rod_panels(r))
 
 
 def figure_2_23() -> Figure:

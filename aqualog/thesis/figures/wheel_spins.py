@@ -28,15 +28,7 @@ from aqualog.thesis.evidence.scenes import (
     spread,
     stretches,
 )
-from aqualog.thesis.figures.panels import (
-    WHEEL_WORDS,
-    bit_panel,
-    by_seed,
-    feature_lines,
-    panel,
-    scene_figure,
-    speed_panel,
-)
+from aqualog.thesis.figures.panels import WHEEL_WORDS, bit_panel, by_seed, drawn_lines, panel, scene_figure, speed_panel
 from aqualog.thesis.record import Axis, Figure, Panel, Table, seconds
 
 __all__ = ["FIGURES", "panels_2_08", "panels_2_09"]
@@ -82,7 +74,7 @@ def panels_2_08(r: DriveRun, front: str = "fr", rear: str = "rr") -> tuple[Panel
     }
     return (
         speed_panel(r),
-        panel(r, "Acceleration differences", _ACCELERATION, feature_lines(r, differences)),
+        panel(r, "Acceleration differences", _ACCELERATION, drawn_lines(r, differences)),
         bit_panel(r, "Detection bits", "detection", bits),
     )
 
@@ -200,7 +192,7 @@ def panels_2_09(r: DriveRun, side: str = "r") -> tuple[Panel, ...]:
         "limit of the difference": (np.full(r.t.size, _LIMITS.delta_min), MUTED, "dot"),
     }
     word = "right" if side == "r" else "left"
-    return speed_panel(r, (front, rear)), panel(r, f"Variances, {word}", _VARIANCE, feature_lines(r, lines))
+    return speed_panel(r, (front, rear)), panel(r, f"Variances, {word}", _VARIANCE, drawn_lines(r, lines))
 
 
 def figure_2_09() -> Figure:
