@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import aqualog
+from aqualog.cli.campaign import _AHEAD
 
 PACKAGE = Path(aqualog.__file__).parent
 ORDER = (
@@ -106,6 +107,13 @@ def test_help_imports_nothing_heavy(command):
     loaded = out.split("LOADED")[-1].split()
     assert "typer" in loaded
     assert not [m for m in HEAVY if m in loaded]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked there only")
+def test_what_workers_are_forked_behind_starts_no_thread():
+    code = f"import {', '.join(_AHEAD)}, os, sys; print(len(os.listdir('/proc/self/task')), 'numba' in sys.modules)"
+    env = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # as a command has it
+    assert subprocess.check_output([sys.executable, "-c", code], text=True, env=env).split() == ["1", "True"]
 
 
 def test_no_absolute_paths_of_a_machine():

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["batch", "bin_resistance", "bin_slipslope", "campaign_app", "init", "plan", "report"]
 
+_AHEAD = ("aqualog.detect.stream", "aqualog.io.mdf.reader", "aqualog.align.lines")  # half of what a worker imports
+
 campaign_app = typer.Typer(
     help="Campaign files: many drives in known configurations.", no_args_is_help=True, rich_markup_mode=None
 )
@@ -73,6 +75,10 @@ def batch(run: Run, limit_s: float | None, limit_mb: int | None, shard: str | No
       aqualog batch campaign.toml --cluster tcp://scheduler:8786 -o s3://bucket/store
       duckdb -c "select tyre, avg(events_joint_criteria) from 'campaign.store/runs.parquet' group by tyre"
     """
+    if cluster is None and run.jobs != 1:
+        from aqualog.guard.worker import share_imports
+
+        share_imports(_AHEAD)
     campaign = run.campaign()
     runs = run.measured(campaign, force=run.force, shard=shard, cluster=cluster, limit_s=limit_s, limit_mb=limit_mb)
     if not runs.data.runs and runs.shard is not None:  # a matrix may have more jobs than there are logs

@@ -12,8 +12,8 @@ from aqualog.core.compiled import compiled
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "APART", "Design", "Index", "Moments", "Noise", "block_moments", "block_starts", "moments_of", "residuals",
-    "second_difference",
+    "APART", "Design", "Index", "Moments", "Noise", "block_moments", "moments_of", "residuals",
+    "second_difference", "starts_of",
 ]  # fmt: skip
 
 APART = 3  # samples between values whose noise is independent: 0.3 s of smoothing at 10 Hz
@@ -46,7 +46,7 @@ class Noise(NamedTuple):
     enters: Sequence[FloatArray | float]
 
 
-def block_starts(label: NDArray[np.int64]) -> NDArray[np.int64]:
+def starts_of(label: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return where the samples of each block begin; labels (n,) ascend."""
     return np.append(0, 1 + np.flatnonzero(label[1:] != label[:-1]))
 
@@ -67,7 +67,7 @@ def block_moments(
         Of the design X.
     y : array (n,)
     first : int array (g,)
-        As `block_starts`.
+        As `starts_of`.
     weight : array (n,), optional
         Diagonal of W; 1 by default.
     noises : sequence of Noise

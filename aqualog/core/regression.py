@@ -16,17 +16,7 @@ from numpy.typing import NDArray
 
 from aqualog.core.compiled import compiled
 from aqualog.core.intervals import Interval, half_width
-from aqualog.core.moments import (
-    APART,
-    Design,
-    Index,
-    Moments,
-    Noise,
-    block_moments,
-    block_starts,
-    moments_of,
-    residuals,
-)
+from aqualog.core.moments import APART, Design, Index, Moments, Noise, block_moments, moments_of, residuals, starts_of
 from aqualog.core.records import FloatArray
 
 __all__ = ["NOISE_MAX", "Estimate", "estimate", "jackknife"]
@@ -45,7 +35,7 @@ def jackknife(d: Design, noises: Sequence[Noise]) -> tuple[FloatArray, FloatArra
     The noises are independent of each other. Returns estimate and half width of the 95 % interval, (p,) each; degrees
     of freedom count the blocks by their information.
     """
-    first = block_starts(d.run)
+    first = starts_of(d.run)
     unit = np.array([math.sqrt(float(np.mean(c * c))) or 1.0 for c in d.columns])  # they differ by orders of magnitude
     h, g = block_moments(d.columns, d.y, first, noises=noises)
     h, g = h / np.multiply.outer(unit, unit), g / unit
@@ -267,7 +257,7 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
     unit = np.sqrt(np.mean(design.columns**2, axis=1))
     unit[unit == 0.0] = 1.0  # columns differ by orders of magnitude
     d = design._replace(columns=design.columns / unit[:, None])
-    first = block_starts(d.run)
+    first = starts_of(d.run)
     plain = moments_of(d, first)
     working = _working_model(d, first, plain)
     moments = _about_own_mean(d, plain, working)

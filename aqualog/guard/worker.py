@@ -11,11 +11,12 @@ import gc
 import multiprocessing
 import os
 import signal
+import sys
 import time
 import traceback
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from multiprocessing import resource_tracker
+from multiprocessing import forkserver, resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.util import Finalize
 from threading import Lock, Thread, Timer, current_thread, main_thread
@@ -27,12 +28,13 @@ from aqualog.guard.system import bound_memory, forbid_core
 
 __all__ = [
     "NO_LIMITS", "Bounds", "Crashed", "Limits", "Raised", "WorkOn", "Worker", "kept_worker", "most_processes",
-    "uninterrupted", "work_on",
+    "share_imports", "uninterrupted", "work_on",
 ]  # fmt: skip
 
 
 _THREADS = ("POLARS_MAX_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _starting = Lock()
+_context: Any = multiprocessing.get_context("spawn")
 _PER_CORE = 4  # more processes than this many a core only take memory
 _IDLE_S = 30.0  # a kept worker waits so long for the next task, and then gives its memory back
 
@@ -66,6 +68,21 @@ class Raised(NamedTuple):
     error: BaseException
 
 
+def share_imports(modules: Sequence[str]) -> None:
+    """Let processes from here on be forked from one that imports these modules now, beside what this process does.
+
+    The modules must start no threads, which a fork would lose: not polars. Elsewhere than on Linux, where libraries
+    do not survive a fork, each process imports everything by itself.
+    """
+    global _context
+    if sys.platform == "linux":
+        _context = multiprocessing.get_context("forkserver")
+        _context.set_forkserver_preload([*modules])
+        resource_tracker.ensure_running()  # as in `Worker.start`
+        with uninterrupted():
+            forkserver.ensure_running()
+
+
 class Worker:
     """A process that is spawned when it is needed: a fork would copy the threads of polars and numba.
 
@@ -87,7 +104,7 @@ class Worker:
         begin = (self.bounds, self._scratch.make() if self._scratch else "")
         self.is_new = True
         self.pipe, theirs = multiprocessing.Pipe()
-        self._process = multiprocessing.get_context("spawn").Process(target=_serve, args=(theirs, *begin))
+        self._process = _context.Process(target=_serve, args=(theirs, *begin))
         if hasattr(signal, "pthread_sigmask"):
             # the first process starts it otherwise, and lets interrupts in that were to wait
             resource_tracker.ensure_running()

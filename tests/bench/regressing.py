@@ -38,12 +38,12 @@ def made(runs: int, samples: int) -> Samples:
 
 def lines_with_aqualog(s: Samples) -> np.ndarray:
     """1 / slope and offset of each run in each bin (cells, 2), by the moments that all fits rest on."""
-    from aqualog.core.moments import Design, block_starts, moments_of
+    from aqualog.core.moments import Design, moments_of, starts_of
 
     cell = s.run * BINS + s.bin
     columns = np.stack([s.mu, np.ones_like(s.mu)])
     design = Design(columns, s.slip, cell, s.step, (True, True), (False, False))
-    m = moments_of(design, block_starts(cell))
+    m = moments_of(design, starts_of(cell))
     return np.linalg.solve(m.h, m.c[:, :, None])[:, :, 0]
 
 
@@ -59,11 +59,11 @@ def lines_with_scipy(s: Samples) -> np.ndarray:
 
 def slopes_with_aqualog(s: Samples) -> np.ndarray:
     """1 / slope of each bin with the half width of its interval (bins, 2), runs as the unit, as `bin-slipslope` has it."""
-    from aqualog.core.moments import Design, block_starts
+    from aqualog.core.moments import Design, starts_of
     from aqualog.core.regression import estimate
 
     found = []
-    first = block_starts(s.run * BINS + s.bin)
+    first = starts_of(s.run * BINS + s.bin)
     cells = np.stack([first, np.append(first[1:], s.bin.size)], axis=1)
     for k in range(BINS):
         here = [slice(a, b) for a, b in cells[s.bin[first] == k].tolist()]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aqualog.core import regression
-from aqualog.core.moments import Design, block_starts, moments_of
+from aqualog.core.moments import Design, moments_of, starts_of
 from aqualog.core.regression import estimate
 from tests.campaign.slope_coverage import World, made, study
 
@@ -127,7 +127,7 @@ def test_likelihood_by_moments_is_that_of_the_covariance_matrix(p):
     y, variance = rng.normal(size=run.size), 0.3
     grid = np.concatenate([np.zeros((1, p)), 10.0 ** rng.uniform(-2, 2, (6, p))])
     d = Design(columns, y, run, np.arange(run.size), (True,) * p, (False,) * p)
-    found = regression._unlikelihood(moments_of(d, block_starts(run), np.ones_like(y)), variance, grid)
+    found = regression._unlikelihood(moments_of(d, starts_of(run), np.ones_like(y)), variance, grid)
     dense = []
     for t in grid:
         V = np.where(run[:, None] == run, columns.T @ (t[:, None] * columns), 0.0) + variance * np.eye(run.size)

@@ -8,15 +8,7 @@ import pytest
 
 from aqualog.core.errors import AqualogError, ConfigError, LogError
 from aqualog.guard import reading as reading_module
-from aqualog.guard.reading import (
-    ReadingState,
-    ReadLimits,
-    StatePage,
-    limits_from,
-    reading,
-    unfinished,
-    watch_reading,
-)  # fmt: skip
+from aqualog.guard.reading import ReadingState, ReadLimits, StatePage, limits_from, reading, unfinished, watch_reading
 from aqualog.guard.system import machine_memory
 
 

@@ -1,6 +1,7 @@
 """An item that ends its process, takes too long or wants too much costs itself, and no other item."""
 
 import gc
+import multiprocessing
 import os
 import time
 from pathlib import Path
@@ -23,7 +24,9 @@ def dies(i, folder):
     return i
 
 
-def test_a_process_that_dies_is_one_item_tried_twice_and_leaves_what_is_beside_it(tmp_path):
+@pytest.mark.parametrize("way", [m for m in ("spawn", "forkserver") if m in multiprocessing.get_all_start_methods()])
+def test_a_process_that_dies_is_one_item_tried_twice_and_leaves_what_is_beside_it(tmp_path, monkeypatch, way):
+    monkeypatch.setattr(worker, "_context", multiprocessing.get_context(way))
     found = {}
     work_on({i: (i, tmp_path) for i in range(14)}, dies, jobs=2, record=found.__setitem__)
     assert sorted(found) == list(range(14))

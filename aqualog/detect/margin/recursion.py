@@ -162,13 +162,6 @@ def _scores(mean, scatter, z, x, P, tail, A, y, score):  # type: ignore[no-untyp
 
 
 @part
-def _copy(x, to):  # type: ignore[no-untyped-def]
-    # an assignment of arrays compiles a message about their shapes, for 4 s
-    for k in range(x.size):
-        to[k] = x[k]
-
-
-@part
 def _place(log_v, i):  # type: ignore[no-untyped-def]
     """Node below a cell of the full speed, and how far it is on the way to the next."""
     place = min(max((_LOG[i] - log_v - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
@@ -223,7 +216,8 @@ def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
     for k in range(score.size):
         m.kinds[k] /= total
     # how much drag and shake belong to a distance differs from law to law more than what is learnt
-    _copy(m.x[1], P)
+    for i in range(_NX):
+        P[i] = m.x[1, i]
     P[0], P[3], P[4] = P[0] + p.law_R**2, P[3] + p.law_M**2, P[4] + p.law_M**2
     keep, log_v, heard = math.exp(-p.dt / p.keep_s), math.log(v), _is(t, m, 1) > p.heard
     if heard:
@@ -295,7 +289,8 @@ def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
     if not math.isnan(old[_V]):
         # slower, a road counts as dry whatever lies on it
         _learn(p, m, old, dry if old[_V] > p.v_least else 1.0)
-    _copy(row, m.window[at])
+    for k in range(row.size):  # an assignment of arrays compiles a message about their shapes, for 4 s
+        m.window[at, k] = row[k]
     _predict(p, t, m)
     traction, more = _gather(p, m)
     w = s[7]

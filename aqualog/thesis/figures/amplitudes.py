@@ -12,7 +12,7 @@ from aqualog.thesis.claims import DIFFERENCE, Check, Verdict, judge, judged, lim
 from aqualog.thesis.evidence.half_car import LOW_SLOPE, SUV, Case, drive
 from aqualog.thesis.figures.timeline import (
     COLOURS,
-    detection_time,
+    detected_s,
     is_falling,
     listed,
     settled_slopes,
@@ -89,11 +89,11 @@ _CAUSES = {
 
 def figure_3_10() -> Figure:
     """Estimates under triangles of both kinds, with the sine in the findings."""
-    times = {kind: {w: {k: detection_time(c) for k, c in cases(w, kind).items()} for w in WAVES} for kind in _KINDS}
+    times = {kind: {w: {k: detected_s(c) for k, c in cases(w, kind).items()} for w in WAVES} for kind in _KINDS}
     mu = times["mu"]
     # the causes of the acceleration's influence are switched off one by one
     causes = {
-        A: {name: [detection_time(replace(Case("sine", A, "mu", 8.0, a_x=a), **off)) for a in MU_A]  # type: ignore[arg-type]
+        A: {name: [detected_s(replace(Case("sine", A, "mu", 8.0, a_x=a), **off)) for a in MU_A]  # type: ignore[arg-type]
             for name, off in _CAUSES.items()}
         for A in (0.03, 0.07)
     }  # fmt: skip

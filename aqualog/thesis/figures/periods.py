@@ -10,15 +10,7 @@ from aqualog.detect.slip_slope.tuning import TUNING
 from aqualog.thesis.catalogue import figure_of
 from aqualog.thesis.claims import Check, judge
 from aqualog.thesis.evidence.half_car import GATE_OFF, Case, adaption_time, drive, estimate, first_alarm, inputs
-from aqualog.thesis.figures.timeline import (
-    COLOURS,
-    detection_time,
-    false_alarms_of,
-    listed,
-    slope_after,
-    slope_panel,
-    told,
-)
+from aqualog.thesis.figures.timeline import COLOURS, detected_s, false_alarms_of, listed, slope_after, slope_panel, told
 from aqualog.thesis.record import Axis, Figure, Line, Panel, Table, seconds
 
 __all__ = ["FIGURES"]
@@ -39,7 +31,7 @@ _VARIANTS = {
 def _times(case: Case, periods: tuple[float, ...], zeta: float = 1.0, h: float = 1.0) -> list[float]:
     """Detection times over the period, with drift and threshold scaled. [s]"""
     tuning = case.tuning._replace(zeta=zeta * case.tuning.zeta, h=h * case.tuning.h)
-    return [detection_time(replace(case, period=p, tuning=tuning)) for p in periods]
+    return [detected_s(replace(case, period=p, tuning=tuning)) for p in periods]
 
 
 def _fastest(periods: tuple[float, ...], times: list[float]) -> float:
@@ -195,7 +187,7 @@ def _change(times: list[float]) -> float:
 
 def figure_3_11() -> Figure:
     """Estimates over both parameters, and the detection times of all pairs."""
-    times = {(q, h): detection_time(_tuned_case(q, h)) for q in Q for h in THRESHOLDS}
+    times = {(q, h): detected_s(_tuned_case(q, h)) for q in Q for h in THRESHOLDS}
     false = false_alarms_of(_tuned_case(q, h) for q in Q for h in THRESHOLDS)
     by_q_near = _change([times[q, 1.0] for q in _NEAR])
     by_q = _change([times[q, 1.0] for q in Q])

@@ -24,7 +24,7 @@ from aqualog.thesis.evidence.half_car import (
 from aqualog.thesis.record import Axis, Line, Panel, Table, seconds
 
 __all__ = [
-    "COLOURS", "TIME", "detection_time", "estimate_lines", "false_alarms_of", "is_falling", "listed",
+    "COLOURS", "TIME", "detected_s", "estimate_lines", "false_alarms_of", "is_falling", "listed",
     "settled_slopes", "slope_after", "slope_panel", "tangent_table", "told",
 ]  # fmt: skip
 
@@ -83,7 +83,7 @@ def estimate_lines(
     return lines
 
 
-def detection_time(case: Case) -> float:
+def detected_s(case: Case) -> float:
     """Time from the change to the first drop found; NaN without a detection. [s]"""
     return first_alarm(drive(case), estimate(case))
 
@@ -100,7 +100,7 @@ def slope_after(case: Case, t: float) -> float:
 
 def told(case: Case) -> str:
     """Detection time in words: seconds, or no detection until the end of the run."""
-    t = detection_time(case)
+    t = detected_s(case)
     return f"not within {case.t_end:g} s" if np.isnan(t) else f"{seconds(t)} s"
 
 

@@ -16,7 +16,7 @@ from aqualog.thesis.figures.brush_curves import TRACTION
 from aqualog.thesis.figures.timeline import (
     COLOURS,
     TIME,
-    detection_time,
+    detected_s,
     false_alarms_of,
     settled_slopes,
     slope_panel,
@@ -39,7 +39,7 @@ def _case(wave: str, a_x: float) -> Case:
 
 
 def _c104_phase() -> tuple[Check, Table]:
-    times = {w: [detection_time(replace(_case(w, 1.0), phase=k / PHASES)) for k in range(PHASES)] for w in WAVES}
+    times = {w: [detected_s(replace(_case(w, 1.0), phase=k / PHASES)) for k in range(PHASES)] for w in WAVES}
     mean = {w: float(np.mean(t)) for w, t in times.items()}  # NaN if a drop was not found
     in_order = mean["step"] < mean["ramp"] < min(mean["triangle"], mean["sine"])
     outcome = "mean (shortest to longest) at 1 m/s²: " + ", ".join(
@@ -58,8 +58,8 @@ def _c104_phase() -> tuple[Check, Table]:
 
 def figure_3_06() -> Figure:
     """Estimates at 1 m/s² (caption) and at constant speed (text, E20)."""
-    times = {w: detection_time(_case(w, 1.0)) for w in WAVES}
-    still = {w: detection_time(_case(w, 0.0)) for w in WAVES}
+    times = {w: detected_s(_case(w, 1.0)) for w in WAVES}
+    still = {w: detected_s(_case(w, 0.0)) for w in WAVES}
     false = false_alarms_of(_case(w, a) for w in WAVES for a in (0.0, 1.0))
     step, ramp, others = times["step"], times["ramp"], [times["triangle"], times["sine"]]
     in_order = step < ramp < min(others)
@@ -149,7 +149,7 @@ _SITUATIONS = {
 
 
 def _c105() -> Check:
-    times = {w: detection_time(_gated(w)) for w in WAVES}
+    times = {w: detected_s(_gated(w)) for w in WAVES}
     idle = {w: 1.0 - used_share(_gated(w))[0] for w in WAVES}
     is_idle = [idle[w] > 0.02 for w in _SMOOTH]
     shares = ", ".join(f"{w} {100 * idle[w]:.0f} %" for w in WAVES)

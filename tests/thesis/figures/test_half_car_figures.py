@@ -262,7 +262,7 @@ def test_thin_lines_are_where_the_estimator_is_idle():
     assert idle.any()
     assert np.array_equal(np.isnan(bold.y), idle)
     assert not (np.isnan(bold.y) & np.isnan(thin.y)).any()
-    assert dot.x[0] == timeline.detection_time(case)
+    assert dot.x[0] == timeline.detected_s(case)
 
 
 OF_TIMES = {"3.6": waveforms, "3.9": periods, "3.10": amplitudes, "3.11": periods}
@@ -270,7 +270,7 @@ OF_TIMES = {"3.6": waveforms, "3.9": periods, "3.10": amplitudes, "3.11": period
 
 def times_of(monkeypatch, number, times):
     """Verdicts of a figure where drops are found after such times."""
-    monkeypatch.setattr(OF_TIMES[number], "detection_time", times)
+    monkeypatch.setattr(OF_TIMES[number], "detected_s", times)
     return {c.name: c.verdict for c in make(number).checks}
 
 
