@@ -76,11 +76,12 @@ def share_imports(modules: Sequence[str]) -> None:
     """
     global _context
     if sys.platform == "linux":
-        _context = multiprocessing.get_context("forkserver")
-        _context.set_forkserver_preload([*modules])
+        context = multiprocessing.get_context("forkserver")
+        context.set_forkserver_preload([*modules])
         resource_tracker.ensure_running()  # as in `Worker.start`
-        with uninterrupted():
+        with suppress(OSError), uninterrupted():  # no place for a socket, or one with too long a name
             forkserver.ensure_running()
+            _context = context
 
 
 class Worker:
