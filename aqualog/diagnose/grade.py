@@ -281,29 +281,13 @@ def _estimate(bins: _Bins, z: FloatArray) -> tuple[FloatArray, FloatArray, Float
     inverse = np.linalg.inv(A.T @ A + P)
     x = inverse @ (A.T @ (z * np.sqrt(weight)))
     left = np.where(bins.used, z - x[:k] - motion @ x[k:], 0.0)
-    coloured = _correlated(left, bins.used)
     # smoothing once more removes about as much as smoothing did the first time
     bias = x[:k] - np.linalg.solve(np.diag(weight) + penalty, weight * x[:k])
-    variance = np.diag(inverse @ (A.T @ A) @ inverse)[:k] * float(np.mean(left[bins.used] ** 2)) * coloured
+    variance = np.diag(inverse @ (A.T @ A) @ inverse)[:k] * float(np.mean(left[bins.used] ** 2))
     theta: FloatArray = x[:k] / G
     theta = theta - float(np.average(theta, weights=bins.weight))
     s: FloatArray = (np.arange(k, dtype=np.float64) + 0.5) * BIN_M
     return s, theta, (1.96 * np.sqrt(np.maximum(variance, 0.0)) + np.abs(bias)) / G
-
-
-def _correlated(x: FloatArray, at: BoolArray) -> float:
-    """Variance of a mean of correlated bins relative to independent ones: 1 + 2 sum of rho. >= 1"""
-    power = max(float(np.mean(x[at] ** 2)), 1e-30)
-    total = 1.0
-    for lag in range(1, 13):
-        both = at[lag:] & at[:-lag]
-        if not both.any():
-            break
-        rho = float(np.mean((x[lag:] * x[:-lag])[both])) / power
-        if rho <= 0.05:
-            break
-        total += 2.0 * rho
-    return total
 
 
 def _mean(bins: _Bins) -> Estimate:
