@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.records import FloatArray
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.shapes import MECHANISMS, Mechanism
@@ -18,7 +17,6 @@ __all__ = ["COORDINATES", "as_term", "describe", "short_form"]
 
 _CARRIED = ("force", ("v_x",))  # mechanism and coordinate that the plant has a table for
 TAPER = 0.08  # of the range: beyond the driven range, the function falls to zero over this share
-ROUGH = 0.15  # of the band's half width: knots that change the function by less are left out
 SHORT_HOLE = 4  # points; a longer stretch without data is nominal
 
 
@@ -27,59 +25,22 @@ def as_term(remainder: Remainder) -> Term | None:
 
     None if the model has no table for this mechanism over these coordinates, or beyond physical bounds.
     """
-    if (remainder.mechanism, remainder.depends_on) != _CARRIED:
+    x, at = remainder.x[:, 0], np.flatnonzero(np.isfinite(remainder.f))
+    if (remainder.mechanism, remainder.depends_on) != _CARRIED or not at.size:
         return None
     effect = EMPIRICAL["unexplained_force"]
     table = effect.table
     assert table is not None
-    x, values = remainder.x[:, 0], remainder.f
-    tolerance = ROUGH * float(np.nanmedian(np.abs((remainder.high - remainder.low) / 2.0)))
-    reach = TAPER * float(np.ptp(x))
-    knots: dict[float, float] = {}
-    runs = _runs(np.isfinite(values))
-    for i, (a, b) in enumerate(runs):
-        before = table.x_low if i == 0 else 0.5 * (x[runs[i - 1][1] - 1] + x[a])
-        after = table.x_high if i == len(runs) - 1 else 0.5 * (x[b - 1] + x[runs[i + 1][0]])
-        inside = [a + int(k) for k in _needed(x[a:b], _filled(values[a:b]), tolerance)]
-        for at, value in (
-            (max(float(x[a]) - reach, before), 0.0),
-            (min(float(x[b - 1]) + reach, after), 0.0),
-            *((float(x[k]), float(_filled(values[a:b])[k - a])) for k in inside),
-        ):
-            knots[at] = value
-    pairs = tuple(sorted(knots.items()))
-    return None if table.fault(pairs) is not None else Term(effect, knots=pairs)
-
-
-def _runs(known: FloatArray) -> list[tuple[int, int]]:
-    """First and one past last of stretches of points with a value, short holes bridged."""
-    at = np.flatnonzero(known)
-    if at.size == 0:
-        return []
     cuts = np.flatnonzero(np.diff(at) > SHORT_HOLE)
-    starts, ends = at[np.r_[0, cuts + 1]], at[np.r_[cuts, at.size - 1]]
-    return [(int(a), int(b) + 1) for a, b in zip(starts, ends, strict=True)]
-
-
-def _filled(values: FloatArray) -> FloatArray:
-    at, good = np.arange(values.size), np.isfinite(values)
-    return np.asarray(np.interp(at, at[good], values[good]), dtype=np.float64)
-
-
-def _needed(x: FloatArray, f: FloatArray, tolerance: float) -> list[int]:
-    """Points between which straight lines stay within the tolerance (Douglas and Peucker [douglas1973])."""
-    kept = {0, x.size - 1}
-    todo = [(0, x.size - 1)]
-    while todo:
-        a, b = todo.pop()
-        if b - a < 2:
-            continue
-        off = np.abs(f[a : b + 1] - np.interp(x[a : b + 1], x[[a, b]], f[[a, b]]))
-        worst = a + int(np.argmax(off))
-        if off[worst - a] > tolerance:
-            kept.add(worst)
-            todo += [(a, worst), (worst, b)]
-    return sorted(kept)
+    first, last = x[at[np.r_[0, cuts + 1]]], x[at[np.r_[cuts, at.size - 1]]]
+    middle, reach = 0.5 * (last[:-1] + first[1:]), TAPER * float(np.ptp(x))
+    zero = [
+        *np.maximum(first - reach, np.r_[table.x_low, middle]),
+        *np.minimum(last + reach, np.r_[middle, table.x_high]),
+    ]
+    known = dict(zip(x[at].tolist(), remainder.f[at].tolist(), strict=True))
+    pairs = tuple(sorted((dict.fromkeys(map(float, zero), 0.0) | known).items()))
+    return None if table.fault(pairs) is not None else Term(effect, knots=pairs)
 
 
 class Coordinate(NamedTuple):
