@@ -260,7 +260,7 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
         return Option(members, _evidence(arena, found, own, measure, nothing), found)
 
     done = dict(zip(chosen, beside(one, chosen), strict=True))
-    within = {m: _within(o) for m, o in done.items() if o is not None}
+    within = {m: _within(m, o.refit) for m, o in done.items() if o is not None and o.refit is not None}
     smaller = [m for m in dict.fromkeys(within.values()) if m not in done]
     done |= dict(zip(smaller, beside(one, smaller), strict=True))
     # water is not linear: without any effect, the simulator may differ from what signatures say of it
@@ -280,12 +280,10 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     return _levelled(evidence, arena, out, within.get(best, best), equal)
 
 
-def _within(option: Option) -> Members:
+def _within(members: Members, r: Refit) -> Members:
     """The members of a refitted set that are not at a physical bound; all of them if each of them is."""
-    if option.refit is None:
-        return option.members
-    at_bound = {i for (i, _), is_at in zip(option.refit.names, option.refit.bounded, strict=True) if is_at}
-    return tuple(m for i, m in enumerate(option.members) if i not in at_bound) or option.members
+    at_bound = {i for (i, _), is_at in zip(r.names, r.bounded, strict=True) if is_at}
+    return tuple(m for i, m in enumerate(members) if i not in at_bound) or members
 
 
 def _levelled(
