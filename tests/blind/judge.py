@@ -1,7 +1,8 @@
 """How well `aqualog diagnose` does on sealed cases of any world.
 
-`python -m tests.blind.judge RUN DIR... [--jobs 2] [--only-score] [--json FILE]` diagnoses each case of each DIR in a process of
-its own, opens the truths, and prints the figures. RUN keeps the verdicts: a run that was killed goes on from there.
+`python -m tests.blind.judge RUN DIR... [--jobs 2] [--only-score] [--rivals] [--json FILE]` diagnoses each case of each DIR in a
+process of its own, opens the truths, and prints the figures. RUN keeps the verdicts: a run that was killed goes on from there.
+With `--rivals` PySINDy, BIC and LASSO work on the same cases, and a table stands them beside aqualog.
 """
 
 from __future__ import annotations
@@ -82,6 +83,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ledgers = {p.out.parent / LEDGER for p in every}
     if changed := [case for ledger in sorted(ledgers) for case in reopened(ledger)]:
         print(f"\nverdicts that changed after their truth was seen: {', '.join(changed)}")
+    if given.rivals:
+        from tests.blind.judging.rivals import all_claims, table  # needs the extra `blind`
+
+        print(f"\n{table(cases, all_claims(done, jobs=given.jobs))}")
     if given.json:
         document = {"measures": [asdict(m) for m in (*measures, *worlds)], "cases": [_line(c) for c in cases]}
         given.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
@@ -109,6 +114,7 @@ def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--timeout", type=float, default=3600.0, help="seconds after which a case has failed")
     parser.add_argument("--only-score", action="store_true", help="judge the verdicts that there are")
     parser.add_argument("--retry", action="store_true", help="diagnose cases that failed once more")
+    parser.add_argument("--rivals", action="store_true", help="other methods beside aqualog (extra `blind`)")
     parser.add_argument("--json", type=Path, help="figures and cases as a document")
     return parser.parse_args(arguments)
 

@@ -1,7 +1,6 @@
 """How well `aqualog diagnose` does on blind cases: one table of measured figures beside their targets.
 
-`python -m tests.blind.score [--metric 1,2,...] [--small] [--jobs 2] [--seeds-from N] [--work DIR] [--json FILE]
-[--rivals]`
+`python -m tests.blind.score [--metric 1,2,...] [--small] [--jobs 2] [--seeds-from N] [--work DIR] [--json FILE]`
 from the checkout. With `--work` every case is kept as it is done, and a run that was killed goes on from there.
 """
 
@@ -23,19 +22,19 @@ from tests.blind.metrics.plan import PARTS, Sizes, plan
 from tests.blind.metrics.rows import Row
 from tests.blind.metrics.run import run
 from tests.blind.metrics.store import Store
-from tests.blind.metrics.table import curve_text, measures_text, rivals_text
+from tests.blind.metrics.table import curve_text, measures_text
 
 NEEDS: dict[int, tuple[str, ...]] = {
     1: ("null",), 2: ("named",), 3: ("named", "third"), 4: ("weak", "limit"), 5: ("named", "third"), 6: ("pairs",),
     7: ("twins",), 8: ("twins",), 9: ("compound",), 10: ("null", "named", "third"), 11: ("unknown",),
-    12: ("detector",), 13: ("null", "named", "third"),
+    12: ("detector",),
 }  # fmt: skip
 """Parts of the plan that a metric is made from."""
 
 MEASURES = {
     1: naming.false_discovery, 2: naming.naming, 3: naming.wrong_names, 4: naming.weak, 5: naming.coverage,
     6: naming.forecasts, 7: naming.confounds, 8: worth.manoeuvres, 9: worth.compounds, 10: worth.gains,
-    11: worth.unknown, 12: worth.detectors, 13: lambda rows: rivals_text(rows)[1],
+    11: worth.unknown, 12: worth.detectors,
 }  # fmt: skip
 
 
@@ -51,8 +50,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run, print, and return 1 if a target was missed."""
     given = _parsed(arguments)
     metrics = sorted({int(n) for n in given.metric.split(",")}) if given.metric else sorted(NEEDS)
-    if given.rivals:
-        metrics = [13]
     parts = [p for p in PARTS if any(p in NEEDS[m] for m in metrics)]
     sizes = _thinned(Sizes(), given.thin)
     jobs = plan(parts, sizes, given.seeds_from)
@@ -68,8 +65,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     curve = naming.risk_coverage(rows) if 2 in metrics or 3 in metrics else []
     if curve:
         print(f"\n{curve_text(curve)}")
-    if 13 in metrics:
-        print(f"\n{rivals_text(rows)[0]}")
     if given.json:
         document = {
             "seeds_from": given.seeds_from,
@@ -92,7 +87,6 @@ def _parsed(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--metric", default="", help="numbers with commas between; default all")
     parser.add_argument("--small", action="store_true", help="a few short drives, under 90 s")
-    parser.add_argument("--rivals", action="store_true", help="only the table beside PySINDy, BIC and LASSO")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
     parser.add_argument("--seeds-from", type=int, default=1000, help="below 200: development")
     parser.add_argument("--thin", type=float, default=1.0, help="so many times fewer cases of each kind")

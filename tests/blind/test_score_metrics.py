@@ -11,7 +11,7 @@ from tests.blind.metrics.plan import PARTS, Job, Sizes, plan
 from tests.blind.metrics.rows import Fact, Row, Said, Second, row_from, row_text
 from tests.blind.metrics.run import run
 from tests.blind.metrics.store import Store
-from tests.blind.metrics.table import measures_text, rivals_text
+from tests.blind.metrics.table import measures_text
 from tests.blind.world.cases import EXACT_PROGRAMMES, Spec
 from tests.blind.world.noise import NOISES
 
@@ -275,34 +275,12 @@ def test_detectors():
     assert worth.detectors([replace(r, detector=one | {"found_after": 7.0}) for r in rows])[1].reached is False
 
 
-def rival_rows(own, other):
-    names = ("found", "right", "gain")
-    null = {m: {"found": x[0], "right": 0.0, "gain": float("nan")} for m, x in (("aqualog", own), ("BIC", other))}
-    hidden = {m: dict(zip(names, (1.0, *x[1:]), strict=True)) for m, x in (("aqualog", own), ("BIC", other))}
-    return [replace(r, rivals=null) for r in nulls(0, 20)] + [row(i, rivals=hidden) for i in range(20)]
-
-
-@pytest.mark.parametrize(
-    ("own", "other", "ahead"),
-    [
-        ((0, 1, 0.9), (1, 0, 0.5), [True] * 4),
-        ((0, 0, 0.9), (1, 1, 0.5), [True, False, True, True]),
-        ((1, 0, 0.5), (0, 1, 0.9), [False] * 4),
-    ],
-)
-def test_rivals(own, other, ahead):
-    text, measures = rivals_text(rival_rows(own, other))
-    assert [m.reached for m in measures] == ahead
-    assert text.splitlines()[2].startswith("| aqualog |")
-
-
 def test_rows_survive_the_way_to_disk():
     r = row(
         second=Second("none", False, "", (SAID,)),
         pairs=((0.7, True),),
         alternatives=(("torque_gain",),),
         limits={"aero_drag": 0.1},
-        rivals={"BIC": {"found": 1.0}},
     )
     assert repr(row_from(row_text(r))) == repr(r)  # NaN is not equal to itself
 

@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.blind.rivals.columns import Residuals, named_columns, scales, stacked
-from tests.blind.rivals.compare import heldout_share, measured
+from tests.blind.judging.answers import read_answer
+from tests.blind.judging.cases import judge
+from tests.blind.judging.rivals import table
+from tests.blind.rivals.columns import Residuals, form_columns, named_columns, scales, stacked
+from tests.blind.rivals.compare import Claim, claims, error_taken
 from tests.blind.rivals.select import SELECTORS
 from tests.blind.rivals.sindy import polynomials, single
 from tests.blind.world.vehicles import CARS
@@ -90,19 +93,59 @@ def test_polynomials_stand_in_the_force_balance_alone():
         assert not x[1:].any()
 
 
-def test_share_of_the_oracle():
-    log, trace = drive("aero_drag", 0.2)
-    assert heldout_share(log, trace, trace) == 1.0
-    assert heldout_share(log, 0.0, trace) == 0.0
-    assert heldout_share(log, -trace, trace) < -1.0
-    assert np.isnan(heldout_share(log, trace, np.zeros_like(trace)))
+def test_the_share_of_the_error_that_a_prediction_takes_away():
+    log, trace = drive("aero_drag", 0.2, sd=0.0)
+    some = log._replace(channels=CHANNELS[:1], residual=log.residual[:1])
+    assert error_taken(some, trace[:1]) == pytest.approx(1.0)
+    assert error_taken(some, 0.5 * trace[:1]) == pytest.approx(0.75)
+    assert error_taken(some, 0.0) == 0.0
+    assert error_taken(some, -trace[:1]) == pytest.approx(-3.0)
 
 
-def test_all_methods_give_a_figure():
-    log, _ = drive("payload_mass", 160.0, tau=1.0)
-    unseen, trace = drive("payload_mass", 160.0, tau=1.0, seed=2)
-    out = measured(log, unseen, trace, CAR, ["payload_mass"])
-    assert set(out) >= {"BIC forward", "LASSO, BIC", "E-SINDy, inclusion 0.9"}
-    assert out["BIC forward"]["right"] == 1.0
-    assert out["BIC forward"]["gain"] > 0.8
-    assert measured(log, None, None, CAR, ["aero_drag"])["BIC forward"]["right"] == 0.0
+def test_a_load_is_claimed_by_its_name_and_a_hump_over_the_speed_as_a_form():
+    log, _ = drive("payload_mass", 160.0)
+    unseen, _ = drive("payload_mass", 160.0, seed=2)
+    said = claims(log, unseen, CAR)
+    assert set(said) >= {"BIC forward", "BIC forward, with forms", "LASSO, BIC", "E-SINDy, inclusion 0.9"}
+    for method in ("BIC forward", "BIC forward, with forms"):
+        assert "payload_mass" in said[method].effects
+        assert said[method].gain > 0.1  # of one channel of six
+    # a force of one hat: no named column has its shape
+    hats = {n: x for n, x in form_columns(log).items() if n.startswith("force|v_x")}
+    log = log._replace(residual=drive(sd=0.002)[0].residual + 0.2 * hats["force|v_x|2"])
+    said = claims(log, None, CAR)
+    first = said["BIC forward, with forms"]
+    assert (first.mechanisms, first.depends_on, first.effects) == (("force",), ("v_x",), ())
+    assert said["BIC forward"].effects
+
+
+def test_all_methods_are_judged_by_one_truth():
+    def case(key, kind, effects=(), unknown=None, verdict="no_effect", causes=(), unexplained=()):
+        truth = {
+            "world": "hand", "seed": 1, "kind": kind, "drive_type": "mixed", "noise": "white", "unknown": unknown,
+            "effects": [{"effect": e, "where": None, "parameters": {}, "detectability": 20.0} for e in effects],
+        }  # fmt: skip
+        said = [{"effect": c, "where": None, "parameters": {}} for c in causes]
+        found = {"verdict": verdict, "causes": said, "alternatives": [], "unexplained": list(unexplained)}
+        return judge(key, read_answer(found), truth)
+
+    form = {"kind": "hump", "mechanism": "force", "depends_on": ["v_x"], "held_back": False}
+    cases = [
+        case("a/null", "null"),
+        case("a/known", "known", ["payload_mass"], verdict="named", causes=["payload_mass"]),
+        case("a/form", "unknown", unknown=form, verdict="unexplained",
+             unexplained=[{"mechanism": "force", "depends_on": ["v_x"], "channel": "force_balance"}]),
+    ]  # fmt: skip
+    own = Claim(False, gain=0.5)
+    bic = [
+        Claim(True), Claim(True, ("torque_gain",), gain=0.2), Claim(True, (), ("force",), ("torque",)),
+    ]  # fmt: skip
+    sindy = [Claim(False), Claim(True, ("trailer", "payload_mass"), gain=-0.1), Claim(True, (), ("force",), ("v_x",))]
+    said = {c.row.key: {"aqualog": own, "BIC": b, "SINDy": s} for c, b, s in zip(cases, bic, sindy, strict=True)}
+    lines = table(cases, said).splitlines()
+    cells = [[c.split(" ")[1] for c in line.split("|")[2:-1]] for line in lines[2:]]
+    assert cells == [
+        ["0.00", "1.00", "0.50", "1.00"],
+        ["1.00", "0.00", "0.20", "0.00"],
+        ["0.00", "1.00", "-0.10", "1.00"],
+    ]

@@ -9,9 +9,6 @@ from tests.blind.metrics.run import run
 from tests.blind.metrics.small import small_jobs
 from tests.blind.metrics.store import Store
 
-pytest.importorskip("sklearn", reason="needs the extra `blind`")
-pytest.importorskip("pysindy", reason="needs the extra `blind`")
-
 
 @pytest.fixture(scope="module")
 def rows():
@@ -50,14 +47,6 @@ def test_unseen_drives_are_predicted_better(rows):
     shares = [r.gain / r.oracle for r in rows if r.truth]
     assert np.median(shares) >= 0.8
     assert all(r.worse <= 0.01 for r in rows if not r.truth)
-
-
-def test_the_rivals_are_behind(rows):
-    hidden = [r for r in rows if r.truth]
-    for method in ("BIC forward", "E-SINDy, inclusion 0.9"):
-        theirs = np.median([r.rivals[method]["gain"] for r in hidden])
-        assert np.median([r.rivals["aqualog"]["gain"] for r in hidden]) > theirs
-        assert all(r.rivals[method]["found"] for r in rows if not r.truth)
 
 
 def test_the_verdict_fits_into_memory(rows):

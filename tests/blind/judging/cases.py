@@ -12,7 +12,7 @@ from tests.blind.judging.answers import Answer, Form, coordinates_of, exact_twin
 from tests.blind.metrics.measure import right_first, right_or_listed
 from tests.blind.metrics.rows import Fact, Row, Said
 
-__all__ = ["Judged", "beyond", "facts_of", "judge"]
+__all__ = ["Judged", "beyond", "facts_of", "fits", "judge"]
 
 LAGS = ("signal_delay", "clock_skew")
 
@@ -102,10 +102,11 @@ class Judged:
         if self.unknown is None or not self.forms or self.row.verdict != "unexplained":
             return False
         first = max(self.forms, key=lambda f: f.probability if math.isfinite(f.probability) else -1.0)
-        return _fits(first, self.unknown, exact=exact)
+        return fits(first, self.unknown, exact=exact)
 
 
-def _fits(form: Form, unknown: Mapping[str, Any], *, exact: bool) -> bool:
+def fits(form: Form, unknown: Mapping[str, Any], *, exact: bool) -> bool:
+    """Whether a form acts by the truth's mechanism over its coordinates: all of them, or one at least."""
     right = [coordinates_of(unknown["depends_on"]), *(coordinates_of(x) for x in unknown.get("also") or ())]
     over = form.depends_on in right if exact else any(form.depends_on & r for r in right)
     return over and mechanism_of(unknown["mechanism"]) in form.mechanisms
@@ -210,7 +211,7 @@ def judge(
     chances = [(p, c.key in right or c.effect in right - set(row.hidden)) for c, p in causes if math.isfinite(p)]
     for f in answer.forms:
         if math.isfinite(f.probability):
-            chances.append((f.probability, unknown is not None and _fits(f, unknown, exact=True)))
+            chances.append((f.probability, unknown is not None and fits(f, unknown, exact=True)))
     return Judged(
         row, truth["world"], truth["kind"], answer.forms, unknown, tuple(chances), answer.gain_low, answer.probability,
         is_baseline=bool(truth.get("is_baseline")), is_measured=clean is not None,

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from aqualog.diagnose.channels import block_step
 from aqualog.diagnose.records import Cause, Diagnosis
 from aqualog.diagnose.run import Options, diagnose
 from aqualog.model.effects import EFFECTS
@@ -20,15 +19,12 @@ from tests.blind.metrics.detector import consequence
 from tests.blind.metrics.plan import Job
 from tests.blind.metrics.rows import Fact, Row, Said
 from tests.blind.metrics.second import second
-from tests.blind.rivals.columns import Residuals
-from tests.blind.rivals.compare import heldout_share, measured
 from tests.blind.world.cases import Case, Hidden, Spec, clean_pair, make_case, truth
 from tests.blind.world.vehicles import CARS
 
 __all__ = ["LEVEL", "SEED", "work"]
 
 SEED, LEVEL = 1, 0.01
-_RIVALS_IN = ("null", "named", "third")
 
 
 def work(job: Job) -> Row:
@@ -176,7 +172,7 @@ def _left_by_twins(job: Job, spec: Spec, case: Case, log: forecast.Log) -> float
 
 
 def _heldout(row: Row, job: Job, spec: Spec, case: Case, found: Diagnosis, log: forecast.Log) -> Row:
-    """Gain on the held-out drive beside the truth's, and the same of the rivals."""
+    """Gain on the held-out drive beside the truth's."""
     signals = case.holdout[0][1]
     if job.group == "detector":
         oracle = gain.true_model(row.truth)
@@ -191,21 +187,4 @@ def _heldout(row: Row, job: Job, spec: Spec, case: Case, found: Diagnosis, log: 
         row = replace(row, gain=gain.log_score(unseen, found.model), oracle=gain.log_score(unseen, model))
     else:
         row = replace(row, worse=gain.worse(unseen, found.model))
-    if job.group in _RIVALS_IN:
-        hidden = [f.key for f in row.truth]
-        rivals = measured(_residuals(log), _residuals(unseen), unseen.trace, case.vehicle, hidden)
-        taken = unseen.residual - gain.residual(unseen.drive, found.model)
-        rivals["aqualog"] = {
-            "found": float(row.found), "terms": float(len(row.causes)), "named": float(bool(row.names)),
-            "right": float(bool(row.causes) and row.found and row.causes[0].key in row.hidden),
-            "gain": heldout_share(_residuals(unseen), taken, unseen.trace),
-        }  # fmt: skip
-        row = replace(row, rivals=rivals)
     return row
-
-
-def _residuals(log: forecast.Log) -> Residuals:
-    d = log.drive
-    n = log.residual.shape[1]
-    coordinates = {k: x[:n] for k, x in d.coordinates.items()}
-    return Residuals(d.channels, log.residual, d.mask, coordinates, block_step(d.dt))

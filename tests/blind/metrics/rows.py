@@ -64,8 +64,7 @@ class Row:
 
     `alternatives`: keys of each alternative set; `pairs`: (forecast, right) of each test of one effect against another;
     `gain`, `oracle`: log score won on the held-out drive by the extended model and by the truth; `worse`: relative change
-    of the worst channel's error there; `detector`: false alarms and finds before, after, and with the truth;
-    `rivals`: what other methods make of the same residuals.
+    of the worst channel's error there; `detector`: false alarms and finds before, after, and with the truth.
     """
 
     key: str
@@ -90,7 +89,6 @@ class Row:
     members: tuple[str, ...] = ()  # all that a set which cannot be separated has to list
     second: Second | None = None
     detector: Mapping[str, float] = field(default_factory=dict)
-    rivals: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     seconds: float = float("nan")  # of the wall clock, beside whatever else runs
     cpu_seconds: float = float("nan")  # of all threads together
     peak_mb: float = float("nan")

@@ -9,19 +9,24 @@ import numpy as np
 
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["TWINS", "Residuals", "named_columns", "stacked"]
+__all__ = ["TWINS", "Residuals", "form_columns", "named_columns", "stacked"]
 
 G = 9.81
 WHEELS = ("fl", "fr", "rl", "rr")
 
 TWINS: dict[str, frozenset[str]] = {
-    # columns that are the same up to a factor: a rival that picks one is taken to have meant the other
+    # effects whose columns are the same up to a factor or nearly: a rival that picks one is taken to have meant the other
     name: frozenset(group)
     for group in (
-        {"rolling_resistance", "brake_drag"}, {"velocity_scale@v_x", "tyre_radius"},
-        {"payload_mass", "payload_mass@f", "payload_mass@r", "wheel_inertia"},
+        {"rolling_resistance", "brake_drag"}, {"velocity_scale", "tyre_radius"},
+        {"payload_mass", "wheel_inertia", "trailer"}, {"signal_delay", "clock_skew"},
     )
     for name in group
+}  # fmt: skip
+HATS = 6  # of a form over one coordinate
+FORMS = {
+    "force": ("force_balance",), "accelerometer": ("force_balance", "kinematic"),
+    "slip@f": ("slip_fl", "slip_fr"), "slip@r": ("slip_rl", "slip_rr"), "lateral": ("lateral",),
 }  # fmt: skip
 
 
@@ -54,6 +59,7 @@ def named_columns(r: Residuals, vehicle: Vehicle) -> dict[str, np.ndarray]:
         "rolling_resistance": {force: np.full_like(v, -G)},
         "road_grade": {kinematic: np.full_like(v, G)},
         "tyre_warmup": {force: -G * vehicle.rolling_resistance * np.exp(-t / 600.0)},
+        "cornering_drag": {force: -(r.coordinates.get("a_y", np.zeros_like(v)) ** 2)},
         "accelerometer_bias@a_x": {force: np.ones_like(v), kinematic: np.ones_like(v)},
         "accelerometer_gain@a_x": {force: a, kinematic: a},
         "accelerometer_drift@a_x": {force: t, kinematic: t},
@@ -63,6 +69,7 @@ def named_columns(r: Residuals, vehicle: Vehicle) -> dict[str, np.ndarray]:
         "velocity_scale@v_x": {f"slip_{w}": -v for w in WHEELS},
         "tyre_radius": {f"slip_{w}": -v for w in WHEELS} | {kinematic: a, force: -torque / (radius * m)},
         "slip_stiffness": {f"slip_{w}": -v * share[w] * torque for w in WHEELS},
+        "slip_stiffness_drift": {f"slip_{w}": -v * share[w] * torque * t for w in WHEELS},
     }
     for w in WHEELS:
         one = f"slip_{w}"
@@ -77,6 +84,26 @@ def named_columns(r: Residuals, vehicle: Vehicle) -> dict[str, np.ndarray]:
         full = np.array([parts.get(c, np.zeros_like(v)) for c in r.channels])
         if np.nanmax(np.abs(full[:, r.mask]), initial=0.0) > 0.0:
             out[name] = full
+    return out
+
+
+def form_columns(r: Residuals) -> dict[str, np.ndarray]:
+    """Hats over each coordinate in each mechanism, to let a rival describe what no effect has: `name|coordinate|k` -> (C, n).
+
+    A hat is one in a sixth of the samples, and falls to zero over the next.
+    """
+    out = {}
+    for name, channels in FORMS.items():
+        at = np.array([[float(c in channels)] for c in r.channels])
+        if not at.any():
+            continue
+        size = r.coordinates["v_x"] if name.startswith("slip") else 1.0  # a slip shows as a speed
+        for coordinate, x in r.coordinates.items():
+            good = r.mask & np.isfinite(x)
+            knots = np.unique(np.quantile(x[good], np.linspace(0.0, 1.0, HATS))) if good.any() else np.zeros(0)
+            for k in range(len(knots) if len(knots) > 2 else 0):
+                hat = np.interp(np.nan_to_num(x), knots, np.eye(len(knots))[k])
+                out[f"{name}|{coordinate}|{k}"] = at * (size * hat)
     return out
 
 

@@ -27,23 +27,23 @@ class Finding(NamedTuple):
 def bic_forward(rows: np.ndarray, y: np.ndarray, names: list[str]) -> Finding:
     """One column after the other, as long as BIC (independent rows) falls; in the order of choice."""
     n = y.size
+    norms = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    unit = rows / norms
+    gram, inner, total = unit.T @ unit, unit.T @ y, float(y @ y)
     chosen: list[int] = []
-    best = n * math.log(max(float(y @ y) / n, 1e-300))
-    coefficients = np.zeros(0)
-    unit = rows / np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
+    best, coefficients = n * math.log(max(total / n, 1e-300)), np.zeros(0)
     while len(chosen) < min(_MOST, len(names)):
         tried = []
         for i in set(range(len(names))) - set(chosen):
-            c, *_ = np.linalg.lstsq(unit[:, [*chosen, i]], y, rcond=1e-8)
-            rest = y - unit[:, [*chosen, i]] @ c
-            tried.append((float(rest @ rest), i, c))
+            at = [*chosen, i]
+            c, *_ = np.linalg.lstsq(gram[np.ix_(at, at)], inner[at], rcond=1e-10)
+            tried.append((total - float(c @ inner[at]), i, c))
         rss, i, c = min(tried, key=lambda x: x[0])
         bic = n * math.log(max(rss / n, 1e-300)) + (len(chosen) + 1) * math.log(n)
         if bic >= best:
             break
         best, coefficients = bic, c
         chosen.append(i)
-    norms = np.maximum(np.linalg.norm(rows, axis=0), 1e-300)
     return Finding({names[i]: float(c / norms[i]) for i, c in zip(chosen, coefficients, strict=True)})
 
 

@@ -10,7 +10,7 @@ from aqualog.core.vehicle import Vehicle
 from tests.blind.rivals.columns import Residuals
 from tests.blind.rivals.select import Finding
 
-__all__ = ["MEANINGS", "THRESHOLDS", "ensemble", "polynomials", "single"]
+__all__ = ["MEANINGS", "OVER", "THRESHOLDS", "ensemble", "polynomials", "single"]
 
 THRESHOLDS = (0.1, 0.02, 0.005)
 BAGS = 20
@@ -20,12 +20,11 @@ _V = 30.0  # [m/s] thresholds are in units of coefficients: the library is scale
 MEANINGS: dict[str, frozenset[str]] = {
     # every effect that has this form, so that each is counted as right where it is the truth
     "1": frozenset((
-        "rolling_resistance", "brake_drag", "accelerometer_bias@a_x", "road_grade", "accelerometer_drift@a_x",
+        "rolling_resistance", "brake_drag", "accelerometer_bias", "road_grade", "accelerometer_drift",
         "tyre_warmup",
     )),
     "u": frozenset((
-        "payload_mass", "payload_mass@f", "payload_mass@r", "torque_gain", "accelerometer_gain@a_x", "wheel_inertia",
-        "trailer",
+        "payload_mass", "torque_gain", "accelerometer_gain", "wheel_inertia", "trailer",
     )),
     "v": frozenset(("head_wind",)),
     "v v": frozenset(("aero_drag", "water_drag", "trailer")),
@@ -33,6 +32,10 @@ MEANINGS: dict[str, frozenset[str]] = {
     "u u": frozenset(),
 }  # fmt: skip
 """What a term would be called in physics; effects of sensors of speed and of tyres have no term in it."""
+OVER: dict[str, frozenset[str]] = {
+    t: frozenset({"v": "v_x", "u": "torque"}[x] for x in t.split() if x != "1") for t in MEANINGS
+}
+"""Coordinates of a term."""
 
 
 def polynomials(r: Residuals, vehicle: Vehicle) -> dict[str, np.ndarray]:
