@@ -362,7 +362,8 @@ def _coordinates(
     slowing = out["a_x"] < BRAKES
     if slowing.any():
         last = np.maximum.accumulate(np.where(slowing, course.t, course.t[0] - LONG_AGO_S))
-        out["since_braking"] = np.minimum(course.t - last, LONG_AGO_S)
+        # while braking it counts as long ago: what lingers begins with a jump where the brakes are let off
+        out["since_braking"] = np.where(slowing, LONG_AGO_S, np.minimum(course.t - last, LONG_AGO_S))
     if "steer_angle" in columns:
         out["steer_angle"] = course.steer
     if "ambient_temperature" in columns:
