@@ -25,12 +25,11 @@ EULER = 0.5772156649015329
 
 
 class Calibration(NamedTuple):
-    """Null distribution: `inflation` (H,) mean gain of each hypothesis over its parameters, `maxima` (S,).
+    """Null distribution: largest gains over their parameters, `maxima` (S,).
 
     `achieved`: share of these maxima beyond the threshold; `tested`: hypotheses that differ from each other.
     """
 
-    inflation: FloatArray
     maxima: FloatArray
     threshold: float
     achieved: float
@@ -64,25 +63,26 @@ def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: 
     leaders = sorted({g for g in groups.tolist() if not evidence.asked[g].allowed})
     bound = bonferroni(level, len(leaders))
     if surrogates == 0:
-        return Calibration(np.ones(len(sizes)), np.zeros(0), bound, level, len(leaders))
+        return Calibration(np.zeros(0), bound, level, len(leaders))
     inner = plain[:-1, :-1]
-    values, vectors = np.linalg.eigh(inner)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    # columns of very different units: in one scale, or rounding alone would give the small ones their gains
+    scale = np.sqrt(np.diag(inner)) + 1e-30
+    values, vectors = np.linalg.eigh(inner / np.outer(scale, scale))
+    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     rng = np.random.default_rng(seed)
     b = root @ rng.standard_normal((surrogates, len(root))).T
     drawn = gains_of(evidence, tolerant(evidence, np.concatenate([inner, b], axis=1)))
     drawn = drawn.reshape(len(sizes), surrogates).T
-    inflation = np.maximum(np.mean(drawn, axis=0) / sizes, 1.0)[groups]
-    maxima = (drawn / inflation / sizes)[:, leaders].max(axis=1)
+    maxima = (drawn / sizes)[:, leaders].max(axis=1)
     # where tolerances are larger than the noise, noise alone gives almost no gain; the car's own deviations do
     mu, beta = _gumbel(maxima)
     threshold = max(mu - beta * math.log(-math.log1p(-level)), bound)
-    return Calibration(inflation, maxima, threshold, float((maxima > threshold).mean()), len(leaders))
+    return Calibration(maxima, threshold, float((maxima > threshold).mean()), len(leaders))
 
 
 def significance(evidence: Evidence, gram: FloatArray, c: Calibration, level: float) -> Significance:
     """The test on inner products (K + 1, K + 1) that forgive the tolerances."""
-    statistic = float((gains_of(evidence, gram) / c.inflation / _sizes(evidence)).max())
+    statistic = float((gains_of(evidence, gram) / _sizes(evidence)).max())
     bound = max(chance(statistic, c.tested), 1e-12)
     p = max(gumbel_p(c.maxima, statistic), bound) if c.maxima.size else bound
     return Significance(statistic, c.threshold, p, level, c.achieved if c.maxima.size else math.nan, c.maxima.size)

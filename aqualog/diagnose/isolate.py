@@ -28,20 +28,19 @@ def p_correct(lam: float) -> float:
     return NormalDist().cdf(0.5 * math.sqrt(max(lam, 0.0)))
 
 
-def reference_sizes(evidence: Evidence, gram: FloatArray, inflation: FloatArray, threshold: float) -> FloatArray:
+def reference_sizes(evidence: Evidence, gram: FloatArray, threshold: float) -> FloatArray:
     """Size of each column (K,) that is detected with a power of 0.9, or the smallest worth naming if that is larger.
 
     NaN where no physical size would be detected.
     """
     out = np.full(evidence.count, np.nan)
-    for i, columns in enumerate(evidence.columns):
+    for columns in evidence.columns:
         for c in columns:
             energy = gram[c, c]
             if energy <= 1e-12:
                 continue
             # the test's statistic is the gain per value of the effect
-            asked = math.sqrt(threshold * len(columns) * inflation[i])
-            seen = (asked + NormalDist().inv_cdf(POWER) * math.sqrt(inflation[i])) / math.sqrt(energy)
+            seen = (math.sqrt(threshold * len(columns)) + NormalDist().inv_cdf(POWER)) / math.sqrt(energy)
             if seen <= max(evidence.high[c], -evidence.low[c]):
                 out[c] = max(seen, evidence.smallest[c])
     return out
@@ -60,7 +59,7 @@ def limits(evidence: Evidence, sizes: FloatArray) -> tuple[Limit, ...]:
     return tuple(out.values())
 
 
-def confusions(evidence: Evidence, gram: FloatArray, sizes: FloatArray, inflation: FloatArray) -> tuple[Confusion, ...]:
+def confusions(evidence: Evidence, gram: FloatArray, sizes: FloatArray) -> tuple[Confusion, ...]:
     """All pairs, and for each effect the sets of two and three rivals that imitate it much better than any one.
 
     Effects have their reference sizes; effects that the log cannot show are left out.
@@ -77,7 +76,7 @@ def confusions(evidence: Evidence, gram: FloatArray, sizes: FloatArray, inflatio
     c = np.array([evidence.columns[i][0] for i in index], dtype=np.intp)
     inner = G[np.ix_(c, c)]
     energy = np.diag(inner)
-    theta = sizes[c] / np.sqrt(inflation[index])
+    theta = sizes[c]
     # energy of row i that column j cannot imitate
     pairs = np.maximum((energy[:, None] - inner**2 / energy[None, :]) * theta[:, None] ** 2, 0.0)
     out = []

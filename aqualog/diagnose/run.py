@@ -115,7 +115,7 @@ def diagnose(
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
     outcome = joined(outcome, seen)
     threshold = max(found.calibration.threshold, HEARD)
-    sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.inflation, threshold)
+    sizes = isolate.reference_sizes(evidence, found.gram, threshold)
     before = [residual(d, model) for d in ready] if road is None else [_led(d, bare) for d in ready]
     after = before if extended.terms == bare.terms else [_led(d, extended) for d in ready]
     differs, is_unclear = extended.terms != bare.terms, outcome.verdict == "cannot_tell"
@@ -138,7 +138,7 @@ def diagnose(
         alternatives=outcome.alternatives,
         significance=found.significance,
         limits=(*isolate.limits(evidence, sizes), *seen.limits),
-        confusions=isolate.confusions(evidence, found.gram, sizes, found.calibration.inflation),
+        confusions=isolate.confusions(evidence, found.gram, sizes),
         remainders=found.forms,
         manoeuvre=next_run,
         gain=gained,

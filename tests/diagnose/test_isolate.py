@@ -7,7 +7,6 @@ from aqualog.diagnose.isolate import confusions, limits, p_correct, reference_si
 from tests.diagnose.test_subsets import ASKED, AT, bench_of, plain, waves
 
 THRESHOLD = 20.0
-ONES = np.ones(len(ASKED))
 
 
 def scaled(change=lambda s: None, by=1.0):
@@ -18,8 +17,8 @@ def scaled(change=lambda s: None, by=1.0):
 
 def judged(b):
     G = plain(b)
-    sizes = reference_sizes(b, G, ONES, THRESHOLD)
-    return G, sizes, confusions(b, G, sizes, ONES)
+    sizes = reference_sizes(b, G, THRESHOLD)
+    return G, sizes, confusions(b, G, sizes)
 
 
 def pair(found, effect, rival):
@@ -65,7 +64,7 @@ def test_two_rivals_that_only_imitate_together_are_told():
 
 
 def test_limits_shrink_with_energy():
-    far, near = (limits(b, reference_sizes(b, plain(b), ONES, THRESHOLD)) for b in (scaled(by=0.2), scaled(by=0.4)))
+    far, near = (limits(b, reference_sizes(b, plain(b), THRESHOLD)) for b in (scaled(by=0.2), scaled(by=0.4)))
     assert {x.effect for x in far} == {h.effect.name for h in ASKED}
     for a, b in zip(far, near, strict=True):
         smallest = ASKED[[h.key for h in ASKED].index(a.effect if a.where is None else f"{a.effect}@{a.where}")]
@@ -81,7 +80,7 @@ def test_the_limit_has_the_power_it_says():
     b = scaled(by=0.2)
     G = plain(b)
     i = AT["head_wind"]
-    size = reference_sizes(b, G, ONES, THRESHOLD)[i]
+    size = reference_sizes(b, G, THRESHOLD)[i]
     found = np.random.default_rng(1).standard_normal(20000) + size * np.sqrt(G[i, i])
     assert (found**2 > THRESHOLD).mean() == pytest.approx(0.9, abs=0.01)
 
@@ -91,7 +90,7 @@ def test_what_is_never_seen_has_no_limit():
         s[AT["road_grade"]] *= 1e-9
 
     b = scaled(silent)
-    found = {x.effect: x.size for x in limits(b, reference_sizes(b, plain(b), ONES, THRESHOLD))}
+    found = {x.effect: x.size for x in limits(b, reference_sizes(b, plain(b), THRESHOLD))}
     assert np.isnan(found["road_grade"])
     _, _, told = judged(b)
     assert all(c.effect != "road_grade" and "road_grade" not in c.rivals for c in told)

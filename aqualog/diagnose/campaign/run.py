@@ -82,7 +82,7 @@ def _diagnosed(
     after = d.best.option.refit if d.best is not None and d.verdict != "cannot_tell" else found.nothing
     # limits are what the runs show, whether or not it is worth naming
     sizes = isolate.reference_sizes(
-        replace(evidence, smallest=np.zeros(evidence.count)), found.gram, c.inflation, c.threshold
+        replace(evidence, smallest=np.zeros(evidence.count)), found.gram, c.threshold
     )  # fmt: skip
     reason = f" ({short_form(found.forms[0])})" if found.forms else ""
     sentence = verdict_sentence(
@@ -101,7 +101,7 @@ def _diagnosed(
         alternatives=d.alternatives,
         significance=found.significance,
         limits=isolate.limits(evidence, sizes),
-        confusions=isolate.confusions(evidence, found.gram, sizes, c.inflation),
+        confusions=isolate.confusions(evidence, found.gram, sizes),
         remainders=found.forms,
         manoeuvre=advice(passes, [s.option for s, _ in d.rivals], found.scatter),
         gain=won,
