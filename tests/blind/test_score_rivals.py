@@ -55,10 +55,7 @@ def test_a_clear_effect_in_white_noise_is_named_first(selector, effect, size):
     found = SELECTORS[selector](rows, y, list(columns))
     # what is exactly the same together is as good: an offset is a slope and the rolling resistance that hides its pull
     same = {effect, "road_grade", "rolling_resistance"} if effect.startswith("accelerometer_bias") else {effect}
-    first, value = next(iter(found.coefficients.items()))
-    assert first in same
-    if selector == "BIC forward" and first == effect == "payload_mass":
-        assert value == pytest.approx(160.0, rel=0.05)
+    assert next(iter(found.coefficients)) in same
 
 
 def test_white_noise_gives_bic_nothing_and_coloured_noise_does():

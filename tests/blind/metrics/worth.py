@@ -112,21 +112,11 @@ def unknown(rows: Sequence[Row]) -> list[Measure]:
                  _median, lambda v: v >= 0.80, ">= 0.80", least=20),
     ]  # fmt: skip
     for name, group in sorted(by(cases, lambda r: r.truth[0].effect).items()):
-        said = by(
-            [r for r in group if r.verdict != "unexplained"], lambda r: "+".join(r.names) or r.verdict or "failed"
-        )
+        others = [r for r in group if r.verdict != "unexplained"]
+        said = by(others, lambda r: "+".join(r.names) or r.verdict or "failed")
         note = ", ".join(f"{n} {len(g)}" for n, g in said.items())
-        out.append(
-            share(
-                11,
-                f"  {name}",
-                [r.verdict == "unexplained" for r in group],
-                lambda v, *_: v >= 0.90,
-                ">= 0.90",
-                least=5,
-                note=note,
-            )
-        )
+        found = [r.verdict == "unexplained" for r in group]
+        out.append(share(11, f"  {name}", found, lambda v, *_: v >= 0.90, ">= 0.90", least=5, note=note))
     return out
 
 

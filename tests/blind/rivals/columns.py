@@ -88,10 +88,7 @@ def named_columns(r: Residuals, vehicle: Vehicle) -> dict[str, np.ndarray]:
 
 
 def form_columns(r: Residuals) -> dict[str, np.ndarray]:
-    """Hats over each coordinate in each mechanism, to let a rival describe what no effect has: `name|coordinate|k` -> (C, n).
-
-    A hat is one in a sixth of the samples, and falls to zero over the next.
-    """
+    """Hats over each coordinate in each mechanism, to let a rival describe what no effect has: `name|coordinate|k` -> (C, n)."""
     out = {}
     for name, channels in FORMS.items():
         at = np.array([[float(c in channels)] for c in r.channels])
