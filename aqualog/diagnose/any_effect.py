@@ -43,7 +43,7 @@ def gains_of(evidence: Evidence, gram: FloatArray) -> FloatArray:
     for i, columns in enumerate(evidence.columns):
         c = list(columns)
         energy = np.diag(gram)[c]
-        if evidence.asked[i].allowed or np.any(energy < 1e-12):
+        if evidence.asked[i].allowed or evidence.barred[i] or np.any(energy < 1e-12):
             continue
         right = gram[c, evidence.count :]
         out[i] = (right * np.linalg.solve(gram[np.ix_(c, c)], right)).sum(axis=0)

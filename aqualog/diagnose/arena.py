@@ -237,7 +237,7 @@ def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, .
     sd = [evidence.prior]
     out = []
     for i, (h, columns) in enumerate(zip(evidence.asked, evidence.columns, strict=True)):
-        if h.allowed:
+        if h.allowed or evidence.barred[i]:
             continue
         c = list(columns)
         moments = MOMENTS if h.effect.drive.begins_like and "start" in h.fixed and len(evidence.drives) == 1 else 1

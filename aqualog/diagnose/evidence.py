@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.records import FloatArray
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.file_values import as_value, day_to_day, deviation, kind_of
@@ -40,6 +40,7 @@ class Evidence:
     high: FloatArray
     smallest: FloatArray
     tolerance: FloatArray  # (K,) deviation of each parameter that is not worth naming
+    barred: BoolArray  # (H,) hypotheses that contradict the drives: neither tested nor put into sets
     spread: FloatArray  # (K,) of the same car between drives, where measured, and of the file's own value
     kinds: tuple[Kind, ...]  # (K,) the kind of day-to-day difference that each looks like
     as_values: FloatArray  # (K,) size of that difference and of the file's errors, expressed as its value
@@ -83,7 +84,7 @@ def make_evidence(
     prior, low, high, smallest, allowed, off, values = np.ascontiguousarray(np.array(rows).T)
     return Evidence(
         tuple(drives), tuple(asked), tuple(residuals), flat, tuple(columns), prior, low, high, smallest, allowed,
-        off, tuple(kinds), values,
+        np.zeros(len(asked), dtype=bool), off, tuple(kinds), values,
     )  # fmt: skip
 
 

@@ -35,6 +35,7 @@ from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Ga
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.run_information import Rival
 from aqualog.diagnose.search import Found, Option, Tell, search, simulated
+from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unknown_term import as_term, short_form
 from aqualog.diagnose.verdict import Outcome
@@ -184,7 +185,7 @@ def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
     evidence, water = around_water(evidence, model)
     if water is not None and water.effect.belongs == "tyre" and not ready[0].vehicle.water:
         notes += (f"On water the drive is likeliest with {term_words(water)}. {_WET}",)
-    return _Setting(evidence, model, bare, road, untested, notes)
+    return _Setting(supported(evidence), model, bare, road, untested, notes)
 
 
 def _sentence(outcome: Outcome[Option], found: Found, options: Options, untested: Mapping[str, str]) -> str:

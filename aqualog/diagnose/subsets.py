@@ -1,23 +1,35 @@
-"""Sets of effects: those that may stand together, and those that look alike on every log.
+"""Sets of effects: those that may stand together, those that look alike on every log, and those that a log supports.
 
 In addition to the twins of an effect, which look like it one by one, two effects together may look like a third one on
 every log: an accelerometer reads a slope like an offset, while the force balance responds to the offset like to a
 rolling resistance. No drive breaks such a relation, so the smaller set has no better evidence than the larger one.
+
+Effects that act everywhere must also show off the water. On water, errors of the water laws shape the residual. A wheel
+with little contact amplifies any slip, and two dry effects that cancel on dry road could replace a wrong water law.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
+import numpy as np
+
 from aqualog.core.notation import AXLES, WHEELS
-from aqualog.diagnose.evidence import Evidence
+from aqualog.diagnose.any_effect import gains_of
+from aqualog.diagnose.channels import contrasts
+from aqualog.diagnose.drive import stretches
+from aqualog.diagnose.evidence import Evidence, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.diagnose.spectrum import weighing
 from aqualog.model.effects import EFFECTS
 
-__all__ = ["TWINS", "compatible", "imitations"]
+__all__ = ["TWINS", "compatible", "imitations", "supported"]
 
 TWINS = 0.1  # share of its energy that an effect must keep beside its twin, to stand in one set with it
+SHOWN = 4.0  # of twice the log-likelihood off the water: two standard deviations
+LEAST = 300  # samples off the water that the check needs at the least
 
 
 def compatible(evidence: Evidence, members: Sequence[int]) -> bool:
@@ -67,3 +79,22 @@ def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tupl
 
 def _are_twins(a: Hypothesis, b: Hypothesis) -> bool:
     return b.effect.name in a.effect.twins or a.effect.name in b.effect.twins
+
+
+def supported(evidence: Evidence) -> Evidence:
+    """The evidence without effects that have no gain off the water; the same evidence on dry drives.
+
+    Effects of water are exempt, and so are drives that are wet nearly all the time.
+    """
+    if not any(d.course.lanes for d in evidence.drives):
+        return evidence
+    dry = [d.mask & (stretches(d) == 0) for d in evidence.drives]
+    if sum(int(m.sum()) for m in dry) < LEAST or any(m.sum() < LEAST // 4 for m in dry):
+        return evidence
+    gram = np.zeros((evidence.count + 1, evidence.count + 1))
+    for r, s, m, d in zip(evidence.residuals, evidence.signatures, dry, evidence.drives, strict=True):
+        rows = weighing([r], m, contrasts(d.channels)).rows(np.concatenate([s, r[None]]))
+        gram += rows @ rows.T
+    of_water = np.array([h.of_water for h in evidence.asked])
+    sizes = np.array([len(c) for c in evidence.columns])
+    return replace(evidence, barred=(gains_of(evidence, tolerant(evidence, gram)) < SHOWN * sizes) & ~of_water)

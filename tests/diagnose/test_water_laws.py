@@ -16,6 +16,7 @@ from aqualog.diagnose.hypotheses import hypotheses, signatures
 from aqualog.diagnose.on_water import around_water, of_water
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import FORM, STRUCTURE, Found, Option, _levelled, _refitted, sharpened, simulated
+from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.tolerances import LANE_TOLERANCES
 from aqualog.model.follow import follow
 from aqualog.model.scenario import Lane
@@ -137,6 +138,7 @@ def test_a_drive_without_water_stays_as_it_is():
     d = prepare(signals(sensors=NOISY), CAR, "a")
     b = simulated([d], [h for h in hypotheses([d], Model())[0] if h.key == "aero_drag"], Model(), quiet)
     assert around_water(b, Model()) == (b, None)
+    assert supported(b) is b
 
 
 @pytest.mark.parametrize(("gains", "is_found"), [((0.6, 0.5), False), ((3.0, 1.0), True)])
@@ -204,8 +206,10 @@ def test_each_thing_that_water_does_is_refitted():
     assert keys <= {"water_drag", "contact_loss", "track_clearing", "uneven_water@left", "uneven_water@right"}
 
 
-def test_a_dry_effect_is_found_on_a_wet_drive_and_no_other_stands_for_the_water():
+def test_what_acts_everywhere_is_barred_where_only_the_water_shows_it():
     d = prepare(wet(term("aero_drag", delta_drag_area=0.3), sensors=NOISY), CAR, "a")
     asked = [h for h in hypotheses([d], Model())[0] if h.of_water or h.key in ("aero_drag", "payload_mass")]
-    arena = arena_of(simulated([d], asked, Model(), quiet), ())
+    b = supported(simulated([d], asked, Model(), quiet))
+    assert {h.key for h, x in zip(b.asked, b.barred, strict=True) if x} == {"payload_mass"}
+    arena = arena_of(b, ())
     assert {arena.blocks[m].key for m in compete(arena).best} == {"aero_drag"}

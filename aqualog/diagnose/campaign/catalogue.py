@@ -71,7 +71,7 @@ def library(passes: Passes, model: Model, asked: Sequence[Hypothesis], given: Mo
     none = np.zeros(sigma.size)
     evidence = Evidence(
         (), tuple(asked), (), (), tuple(places), sigma, low, high, np.array([p.smallest for p, _ in parameters]),
-        none, none, tuple("" for _ in sigma), none,
+        none, np.zeros(len(asked), dtype=bool), none, tuple("" for _ in sigma), none,
     )  # fmt: skip
     return Library(evidence, np.nan_to_num(np.stack(columns, axis=-1)), expected, road * _points_of_road(passes))
 
