@@ -1,5 +1,7 @@
 """The family-wise test: the level that is asked for on noise, and a large effect beyond it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,14 @@ def test_the_same_seed_gives_the_same_draws():
     a, same, other = (calibrate(b, plain(b), surrogates=9, level=0.05, seed=s).maxima for s in (1, 1, 2))
     assert np.array_equal(a, same)
     assert not np.array_equal(a, other)
+
+
+def test_the_units_of_columns_do_not_matter_for_the_draws():
+    b = null(1)
+    by = np.where(np.arange(b.count) % 2, 1.0, 1e9)
+    other = replace(b, tolerance=b.tolerance / by, signatures=(b.signatures[0] * by[:, None, None],))
+    usual, found = (calibrate(x, plain(x), surrogates=199, level=0.05, seed=1).maxima for x in (b, other))
+    assert np.median(found) == pytest.approx(np.median(usual), rel=1e-3)
 
 
 def test_without_surrogates_the_bound_grows_with_the_number_of_questions():

@@ -17,6 +17,7 @@ from aqualog.diagnose.channels import block_step
 from aqualog.model.term import Model
 from tests.blind.judging.answers import Form, exact_twins
 from tests.blind.judging.cases import Judged, fits
+from tests.blind.judging.figures import STRONG
 from tests.blind.judging.run import Place
 from tests.blind.judging.work import log_of
 from tests.blind.metrics.engine import prepare, residual
@@ -27,8 +28,6 @@ from tests.blind.rivals.compare import Claim, claims
 __all__ = ["OWN", "Said", "all_claims", "table"]
 
 OWN = "aqualog"
-FILE = "rivals.json"
-STRONG = 8.0
 Said = dict[str, Claim]
 
 
@@ -39,7 +38,7 @@ def all_claims(done: Sequence[Place], *, jobs: int) -> dict[str, Said]:
 
 
 def _claims(place: Place) -> Said:
-    kept = place.out / FILE
+    kept = place.out / "rivals.json"
     if not kept.is_file():
         vehicle = load_vehicle(place.case / "vehicle.toml")
         drive, held = (log_of(place.case, stem) for stem in ("drive", "held"))
