@@ -18,7 +18,7 @@ from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.spectrum import weighing
 from aqualog.model.term import Kind, Model
 
-__all__ = ["Evidence", "Forgiven", "forgiving", "make_evidence", "recentred", "tolerant"]
+__all__ = ["FARTHEST", "Evidence", "Forgiven", "forgiving", "make_evidence", "recentred", "tolerant"]
 
 FARTHEST = 2.0  # standard deviations, beyond which a fault is likelier than an error of the file
 

@@ -42,31 +42,32 @@ class LogScoreGain(NamedTuple):
 
 def measured_gain(
     drives: Sequence[Drive],
-    before: Model,
-    after: Model,
+    models: tuple[Model, Model, Model],
     noise: Noise,
     *,
     seed: int,
     in_sample: bool,
     consequences: tuple[Consequence, ...] = (),
 ) -> Gain:
-    """Error and log score with one model and the other, on drives with the channels that the noise was fitted on.
+    """Error and log score of models on drives with the channels that the noise was fitted on.
 
-    `noise`: of the diagnosed drive after its best set, one measure for both models; `seed` of the bootstrap;
+    `models`: as the file has it, the same at the car's likeliest values, and extended at its likeliest values. Errors
+    fall from the first to the last; the log score is gained over the second, so that it is the effects' alone.
+    `noise`: of the diagnosed drive after its best set, one measure for all models; `seed` of the bootstrap;
     `in_sample`: these are the diagnosed drives themselves. The channel `speed` is the error of a simulation that runs
     free for half a minute [m/s].
     """
     masks, names = [d.mask for d in drives], tuple(d.name for d in drives)
     # each model has its own target speed with which it meets the measured speed
-    x, y = ([residual(led_by(d, m), m) for d in drives] for m in (before, after))
+    x, alone, y = ([residual(led_by(d, m), m) for d in drives] for m in models)
     channels = [
         ChannelGain(name, CHANNELS[name].unit, *rms_of_both([r[i] for r in x], [r[i] for r in y], masks))
         for i, name in enumerate(drives[0].channels)
     ]
     if not drives[0].untorqued:
-        then, now = ([_free_speed(d, m) for d in drives] for m in (before, after))
+        then, now = ([_free_speed(d, m) for d in drives] for m in models[::2])
         channels.append(ChannelGain(SPEED, "m/s", math.nan, math.nan, *rms_of_both(then, now, masks)))
-    scores = [[_scores(d, r, noise) for d, r in zip(drives, own, strict=True)] for own in (x, y)]
+    scores = [[_scores(d, r, noise) for d, r in zip(drives, own, strict=True)] for own in (alone, y)]
     won = log_score_gain(scores[0], scores[1], seed=seed)
     notes = scope(names, scores[0], scores[1], won, in_sample=in_sample)
     return Gain(tuple(channels), *won, () if in_sample else names, in_sample, consequences, notes)

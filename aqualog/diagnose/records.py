@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from aqualog.core.records import FloatArray
-from aqualog.model.term import Model
+from aqualog.model.term import Model, Term
 
 __all__ = [
     "AGREES", "SURE", "Agreement", "Alternative", "ByDrive", "Cause", "ChannelGain", "Confusion", "Consequence",
@@ -246,7 +246,10 @@ class ResidualView:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """The result. `causes` with `cannot_tell`: the set that the log cannot separate; `caution`: to know before it."""
+    """The result. `causes` with `cannot_tell`: the set that the log cannot separate; `caution`: to know before it.
+
+    `deviations`: what car and tyres differ by from their file within its tolerances, most likely, counted in the gain.
+    """
 
     verdict: Verdict
     sentence: str
@@ -268,6 +271,7 @@ class Diagnosis:
     views: tuple[ResidualView, ...] = field(default=(), repr=False)
     agreement: tuple[Agreement, ...] = ()
     caution: str = ""
+    deviations: tuple[Term, ...] = ()
 
 
 def tempered(p: float) -> float:

@@ -12,12 +12,12 @@ import numpy.typing as npt
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import CHUNK, Arena, Part, products
-from aqualog.diagnose.evidence import Evidence
+from aqualog.diagnose.evidence import FARTHEST, Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.model.term import Model
 
-__all__ = ["KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "metric", "refit"]
+__all__ = ["KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "likeliest", "metric", "refit"]
 
 KNOWN = 0.25  # share of the tolerances that values and intervals take into account
 PRIOR_WIDTH = 3.0  # the prior is this much wider than the effect's: it only keeps huge, cancelling pairs apart
@@ -122,6 +122,26 @@ def metric(
     A *= np.float32(math.sqrt(coarse))
     M = np.asarray(np.linalg.inv(np.eye(len(A)) + products(A)))
     return Metric(arena.parts, tuple(weighings), A, M, apart, coarse)
+
+
+def likeliest(evidence: Evidence, measure: Metric, residuals: Sequence[FloatArray], model: Model) -> Model:
+    """The model with what the car and its tyres differ by from their file, most likely beside these residuals (C, n).
+
+    All tolerances deviate together, theta = (S^-2 + A'A)^-1 A'y, each up to `FARTHEST`. Those of a drive or a lane are
+    left out of the model: another drive has other ones. A term that the model has keeps its values. `measure`: with all
+    tolerances in full.
+    """
+    k = np.flatnonzero(evidence.forgiven > 0.0)
+    theta = np.zeros(evidence.count)
+    likely = measure.M @ measure.across(measure.rows([r[None] for r in residuals]))[0]
+    theta[k] = evidence.forgiven[k] * np.clip(likely, -FARTHEST, FARTHEST)
+    own, has = [], {(t.effect.name, t.place) for t in model.terms}
+    for h, columns in zip(evidence.asked, evidence.columns, strict=True):
+        stays = h.lane is None and h.effect.belongs in ("car", "tyre") and theta[list(columns)].any()
+        if stays and (h.effect.name, h.where or h.effect.default) not in has:
+            at = [(n, h.parameter(n), value_in(model, h, n) + theta[c]) for n, c in zip(h.free, columns, strict=True)]
+            own.append((h, {n: min(max(float(x), p.low), p.high) for n, p, x in at}))
+    return with_values(model, own)
 
 
 def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure: Metric, model: Model) -> Refit | None:

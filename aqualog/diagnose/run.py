@@ -32,7 +32,7 @@ from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
 from aqualog.diagnose.outcome import conclude, with_causes
 from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView, Verdict
-from aqualog.diagnose.refit import Refit
+from aqualog.diagnose.refit import Refit, likeliest, metric
 from aqualog.diagnose.run_information import Rival
 from aqualog.diagnose.search import Found, Option, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
@@ -118,13 +118,18 @@ def diagnose(
     threshold = max(found.calibration.threshold, HEARD)
     sizes = isolate.reference_sizes(evidence, found.gram, threshold)
     before = [residual(d, model) for d in ready] if road is None else [_led(d, bare) for d in ready]
-    after = before if extended.terms == bare.terms else [_led(d, extended) for d in ready]
     differs, is_unclear = extended.terms != bare.terms, outcome.verdict == "cannot_tell"
+    after, settled = before, extended
+    if differs:
+        measure = metric(found.arena, found.posterior.weighings)
+        alone = likeliest(evidence, measure, evidence.residuals, bare)
+        settled = likeliest(evidence, measure, [_led(d, extended) for d in ready], extended)
+        after = [_led(d, settled) for d in ready]
     tell("searching for a run that distinguishes the causes" if is_unclear else "measuring the gain", 0.8)
     rivals = [Rival(s.option.refit, q) for s, q in outcome.rivals if s.option.refit is not None]
     last: list[Callable[[], Any]] = []
     if differs:
-        last.append(lambda: _gained(ready, holdout, vehicle, bare, extended, noises[0], options))
+        last.append(lambda: _gained(ready, holdout, vehicle, (bare, alone, settled), extended, noises[0], options))
     if is_unclear:
         last.append(lambda: next_manoeuvre(evidence, rivals, noises, model))
     done = beside(lambda f: f(), last)
@@ -144,6 +149,7 @@ def diagnose(
         manoeuvre=next_run,
         gain=gained,
         model=with_rings(extended, seen),
+        deviations=tuple(t for t in settled.terms if t not in extended.terms),
         channels=ready[0].channels,
         untested=untested | seen.untested,
         notes=(*notes, *_unnamed(outcome, found, options), *outcome.notes, *seen.notes),
@@ -198,19 +204,23 @@ def _sentence(outcome: Outcome[Option], found: Found, options: Options, untested
 
 
 def _gained(
-    ready: Sequence[Drive], holdout: Sequence[tuple[str, Signals]], vehicle: Vehicle, given: Model, extended: Model,
-    noise: Noise, options: Options,
+    ready: Sequence[Drive], holdout: Sequence[tuple[str, Signals]], vehicle: Vehicle,
+    models: tuple[Model, Model, Model], extended: Model, noise: Noise, options: Options,
 ) -> Gain:  # fmt: skip
-    """Gain of the extended model over the given one: on unseen drives if there are any, else on the diagnosed ones."""
-    own = {id(t) for t in given.terms}  # a road is this drive's own
-    elsewhere = Model(tuple(t for t in extended.terms if id(t) in own or t.effect.name != "unexplained_grade"))
+    """Gain of the last of the models over the given one, on unseen drives if there are any, else on the diagnosed ones;
+    what the extended model means for the detectors."""
+    own = {id(t) for t in models[0].terms}  # a road is this drive's own
+
+    def elsewhere(m: Model) -> Model:
+        return Model(tuple(t for t in m.terms if id(t) in own or t.effect.name != "unexplained_grade"))
+
     unseen = _prepared(holdout, vehicle)[0] if holdout else []
     unseen = [d for d in unseen if d.channels == ready[0].channels]
     effects: tuple[Consequence, ...] = ()
     if options.consequences and "mass" in vehicle.given:
-        effects = consequences(vehicle, elsewhere, seed=options.seed)
+        effects = consequences(vehicle, elsewhere(extended), seed=options.seed)
     return measured_gain(
-        unseen or ready, given, elsewhere if unseen else extended, noise, seed=options.seed,
+        unseen or ready, (*models[:2], elsewhere(models[2])) if unseen else models, noise, seed=options.seed,
         in_sample=not unseen, consequences=effects,
     )  # fmt: skip
 

@@ -227,7 +227,7 @@ def wheel(i, now, ground, command, m, p, q):  # type: ignore[no-untyped-def]
     roll = _rolling(i, now, ground.F_z, m, p, q)
     wet = _water(roll, ground, p.scatter, q)
     stiff = _stiffness(now, ground, q)
-    slips = _slip(i, m, roll, q.relaxation_length)
+    slips = _slip(i, m, roll, q.relaxation_length, p.dt)
     F_x, F_y = _brush_forces(slips.s_x, slips.s_y, ground.F_z, wet.mu, stiff.C_x, stiff.C_y, wet.contact)
     balance = _balance(i, roll, ground, wet, command, m, p, q)
     if q.belt_inertia > 0.0:
@@ -329,19 +329,21 @@ def _stiffness(now, ground, q):  # type: ignore[no-untyped-def]
 
 
 @part
-def _slip(i, m, roll, sigma):  # type: ignore[no-untyped-def]
-    """Return the slips, with a first-order build-up where the tyre has a relaxation length."""
+def _slip(i, m, roll, sigma, dt):  # type: ignore[no-untyped-def]
+    """Return the slips, with a first-order build-up where the tyre has a relaxation length that it takes longer than a
+    step to roll."""
     s_x = _bounded_slip(roll.rim, roll.along)
     speed = max(abs(roll.rim), 0.5)
     s_y = -roll.across / speed
     if sigma > 0.0:
-        rate = speed / sigma
+        rate = min(speed / sigma, 1.0 / dt)
         m.f[SLIP_X + i] = rate * (s_x - m.y[SLIP_X + i])
         m.f[SLIP_Y + i] = rate * (s_y - m.y[SLIP_Y + i])
         if m.is_first > 0.0:
             m.jac[SLIP_X + i] = -rate
             m.jac[SLIP_Y + i] = -rate
-        return _Slip(m.y[SLIP_X + i], m.y[SLIP_Y + i], 0.0, 0.0)
+        if sigma > speed * dt:
+            return _Slip(m.y[SLIP_X + i], m.y[SLIP_Y + i], 0.0, 0.0)
     by_omega = max(roll.along, 0.0) * roll.r_e / (speed * speed) if abs(roll.rim) > 0.5 else 2.0 * roll.r_e
     return _Slip(s_x, s_y, by_omega, -1.0 / speed)
 

@@ -11,7 +11,7 @@ from aqualog.diagnose.compete import compete, fitted
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import Hypothesis, with_values
 from aqualog.diagnose.hypotheses import simulated as shown
-from aqualog.diagnose.refit import KNOWN, metric, refit
+from aqualog.diagnose.refit import KNOWN, likeliest, metric, refit
 from aqualog.diagnose.search import simulated
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
@@ -158,3 +158,21 @@ def test_the_nearest_rival_of_each_effect_is_refitted(monkeypatch):
     monkeypatch.setattr(search, "refit", lambda _led, own, *_: asked.append(tuple(own)))
     search._refitted(evidence, arena, posterior, Model())
     assert any(arena.blocks[drag].tag in own for own in asked)
+
+
+def test_the_cars_own_values_are_likeliest_within_the_tolerance_and_a_known_term_stays():
+    """A radius 0.05 % off is found; one that is 1 % off counts with two tolerances; the wind is the drive's own."""
+    asked = [one("tyre_radius", "rl"), one("tyre_radius", "rr"), one("head_wind")]
+    for delta, low, high in ((5e-4, 4e-4, 6e-4), (1e-2, 6.6e-4, 6.7e-4)):
+        evidence, _, _ = prepared(asked, term("tyre_radius", "rl", delta=delta))
+        arena = known_only(arena_of(evidence, ()))
+        measure = metric(arena, compete(arena).weighings)
+        found = {
+            (t.effect.name, t.where): t.values for t in likeliest(evidence, measure, evidence.residuals, Model()).terms
+        }
+        assert set(found) == {("tyre_radius", "rl"), ("tyre_radius", "rr")}
+        assert low < found["tyre_radius", "rl"]["delta"] < high
+        assert abs(found["tyre_radius", "rr"]["delta"]) < 1e-4
+    known = Model((term("tyre_radius", "rl", delta=0.05),))
+    kept = likeliest(evidence, measure, evidence.residuals, known).terms[0]
+    assert kept.values["delta"] == 0.05

@@ -257,6 +257,7 @@ def test_gain_is_on_unseen_drives_where_there_are_any():
     assert d.gain.log_score > 0.0
     force = next(c for c in d.gain.channels if c.channel == "force_balance")
     assert force.rmse_after < 0.5 * force.rmse_before
+    assert {t.effect.name for t in d.deviations}.isdisjoint({t.effect.name for t in d.model.terms} | {"head_wind"})
 
 
 def test_a_late_velocity_is_named_without_one_of_the_wheels(monkeypatch):

@@ -178,6 +178,7 @@ DIAGNOSE = Document(
         ), null=True),
         text("extended_model", "model file that was written; null without `-o`", null=True),
         rows("model", "terms of the extended model", TERMS),
+        rows("deviations", "likeliest values within the vehicle file's tolerances, which the gain counts", TERMS),
         several("channels", "residuals that were judged"),
         mapping("channel_units", "their units", text("", "")),
         mapping("untested", "effects that were not tested, and why", text("", "")),

@@ -12,6 +12,7 @@ import numpy as np
 from aqualog.diagnose.records import Cause, Confusion, Consequence, Diagnosis, Estimate, Gain, Limit, Remainder
 from aqualog.diagnose.shapes import MECHANISMS
 from aqualog.model.effects import EFFECTS
+from aqualog.model.term import Term
 from aqualog.report.values import fields_of, plain, quantity_text
 
 __all__ = ["diagnosis_document"]
@@ -85,10 +86,8 @@ def diagnosis_document(
             "minutes": plain(m.minutes),
         },
         "extended_model": extended_model,
-        "model": [
-            {"effect": t.effect.name, "where": t.where, "parameters": plain(t.values),
-             **({"knots": plain(t.knots)} if t.knots else {})} for t in d.model.terms
-        ],
+        "model": [_term(t) for t in d.model.terms],
+        "deviations": [_term(t) for t in d.deviations],
         "channels": list(d.channels),
         "channel_units": units,
         "untested": dict(d.untested),
@@ -122,6 +121,11 @@ def _remainder(r: Remainder) -> dict[str, Any]:
         **{name: plain(np.asarray(getattr(r, name), dtype=np.float64)) for name in ("f", "low", "high")},
         **fields_of(r, "proxies", "nearest", "cosine", "sentence", similar_to="nearest"),
     }
+
+
+def _term(t: Term) -> dict[str, Any]:
+    knots = {"knots": plain(t.knots)} if t.knots else {}
+    return {"effect": t.effect.name, "where": t.where, "parameters": plain(t.values), **knots}
 
 
 def _gain(g: Gain) -> dict[str, Any]:
