@@ -114,7 +114,7 @@ def diagnose(
     extended = _extended(outcome, chosen, found.forms, model if is_named else bare, evidence.asked)
     names = {d.name for d in ready}
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
-    outcome = joined(outcome, seen)
+    outcome, forms = joined(outcome, seen), (*found.forms, *seen.forms)
     threshold = max(found.calibration.threshold, HEARD)
     sizes = isolate.reference_sizes(evidence, found.gram, threshold)
     before = [residual(d, model) for d in ready] if road is None else [_led(d, bare) for d in ready]
@@ -136,7 +136,7 @@ def diagnose(
     gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
     return Diagnosis(
         verdict=outcome.verdict,
-        sentence=_sentence(outcome, found, options, untested | seen.untested),
+        sentence=_sentence(outcome, found, forms, options, untested | seen.untested),
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
         used_s=sum(d.used_s for d in ready),
@@ -145,7 +145,7 @@ def diagnose(
         significance=found.significance,
         limits=(*isolate.limits(evidence, sizes), *seen.limits),
         confusions=isolate.confusions(evidence, found.gram, sizes),
-        remainders=found.forms,
+        remainders=forms,
         manoeuvre=next_run,
         gain=gained,
         model=with_rings(extended, seen),
@@ -194,8 +194,10 @@ def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
     return _Setting(supported(evidence), model, bare, road, untested, notes)
 
 
-def _sentence(outcome: Outcome[Option], found: Found, options: Options, untested: Mapping[str, str]) -> str:
-    reason = f" ({short_form(found.forms[0])})" if found.forms else ""
+def _sentence(
+    outcome: Outcome[Option], found: Found, forms: Sequence[Remainder], options: Options, untested: Mapping[str, str]
+) -> str:  # fmt: skip
+    reason = f" ({short_form(forms[0])})" if forms else ""
     p = found.significance.p_value
     return verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -65,6 +66,7 @@ COORDINATES = {
     "steer_angle": Coordinate("steer angle", "rad", "rad"),
     "yaw_rate": Coordinate("yaw rate", "rad/s", "rad/s"),
     "since_braking": Coordinate("time since braking", "s", "s"),
+    "angle": Coordinate("angle of the wheel", "rad", "turns", 0.5 / math.pi),
     "depth": Coordinate("water depth", "m", "mm", 1e3),  # of a campaign's runs, like the next ones
     "pressure": Coordinate("tyre pressure", "Pa", "bar", 1e-5),
     "load": Coordinate("load", "kg", "kg"),
@@ -79,7 +81,7 @@ ALIKE = 0.9  # cosine from which a known effect looks nearly the same
 
 def describe(mechanism: Mechanism, r: Remainder) -> str:
     """Sentences: mechanism and coordinate, its largest value, coordinates that explain it as well, similar effects."""
-    title = _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title.lower() if r.channel in CHANNELS else r.channel)
+    title = _channel(r)
     how = r.manner or f"goes with {' and '.join(map(_title, r.depends_on))}"
     text = f"Unexplained: {mechanism.title} {how} (probability {r.probability:.2f}"
     text += f"; {r.share:.0%} of the variance of the {title}"
@@ -102,9 +104,13 @@ def describe(mechanism: Mechanism, r: Remainder) -> str:
 
 def short_form(remainder: Remainder) -> str:
     """`a force on the car that goes with speed`, `a force on the car from 66 s to 145 s`."""
-    title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), remainder.channel)
+    title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), _channel(remainder))
     how = remainder.manner or f"that goes with {' and '.join(map(_title, remainder.depends_on))}"
     return f"{title} {how}"
+
+
+def _channel(r: Remainder) -> str:
+    return _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title.lower() if r.channel in CHANNELS else r.channel)
 
 
 def _title(name: str) -> str:

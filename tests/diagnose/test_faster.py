@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from aqualog.diagnose import arena, faster, run
@@ -80,6 +81,25 @@ def test_a_ring_beside_each_verdict(before, own, after):
     assert [c.key for c in out.causes] == [*(c.key for c in own), "tone_ring@fl"]
     assert "tone_ring" in out.certain
     assert joined(Outcome(before, own), Faster()) == Outcome(before, own)
+
+
+def test_a_wheel_that_varies_unlike_the_others_is_an_unknown_form():
+    """All four alike are sound tyres; a ring to be named is no form, nor is its harmonic."""
+    small = [replace(ring(w, 3e-4, 5e-5), order=2) for w in ("fl", "fr", "rl")]
+    odd = replace(ring("rr", 1.5e-3), order=2)
+    (form,) = faster.odd_wheels([*small, odd])
+    assert (form.channel, form.mechanism, form.depends_on) == ("slip_rr", "slip", ("angle",))
+    assert np.abs(form.f).max() == pytest.approx(1.5e-3)
+    assert form.f[0] == pytest.approx(form.f[-1])
+    assert np.count_nonzero(np.diff(np.sign(form.f))) == 4  # twice per turn
+    assert "wheel RR, varying twice per turn by 0.15%, 5 times" in form.sentence
+    assert joined(Outcome("no_effect", ()), Faster(forms=(form,))).verdict == "unexplained"
+    assert joined(Outcome("cannot_tell", (MASS,)), Faster(forms=(form,))).verdict == "cannot_tell"
+    for others in ([replace(x, amplitude=8e-4) for x in small], [*small, ring("rr")], []):
+        assert faster.odd_wheels([*others, odd]) == ()
+    assert faster.odd_wheels([*small, replace(odd, kind="nothing")]) == ()
+    (once,) = faster.odd_wheels([*(ring(w, 3e-4) for w in ("fl", "fr")), ring("rl", 1.8e-3)])
+    assert once.nearest == "tone_ring"
 
 
 def test_what_sound_wheels_show_is_no_name():
