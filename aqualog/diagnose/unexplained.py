@@ -15,6 +15,7 @@ from aqualog.diagnose.arena import Arena, Field
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.compete import Fitted, Posterior, fitted
 from aqualog.diagnose.competition import Block
+from aqualog.diagnose.hypotheses import WORTH
 from aqualog.diagnose.records import SURE, Remainder, tempered
 from aqualog.diagnose.sets import Sets, evidence_of
 from aqualog.diagnose.unknown_term import describe
@@ -24,7 +25,7 @@ __all__ = ["Clear", "clear_forms", "described", "unknown_forms"]
 AHEAD = 3.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
 WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
-LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what it explains, by the channel's unit
+LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what is large, by the channel's unit
 NOTABLE = 0.05  # probability from which another coordinate is mentioned
 ALIKE = 0.2  # share of the best coordinate's probability from which the drive cannot distinguish another
 DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points together
@@ -68,8 +69,9 @@ def clear_forms(field: Field, found: Sets, inner: FloatArray) -> list[Clear]:
 def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
     """Shapes of the best set that no known effect replaces, what explains most first; empty if none is that clear.
 
-    Beside the conditions of `clear_forms`, a mechanism must explain 5 % of a channel's variance, and no effect of the
-    library may stand for it. A load of a fifth of the car looks like a torque that goes with the torque.
+    Beside the conditions of `clear_forms`, a mechanism must explain 5 % of a channel's variance. What it explains must
+    be large, or a smooth function twice what a car and its simulation differ by anyway. And no effect of the library
+    may stand for it: a load of a fifth of the car looks like a torque that goes with the torque.
     """
     clear = clear_forms(arena, posterior, posterior.tolerant)
     if not clear:
@@ -77,10 +79,13 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     fit = fitted(arena, posterior.tolerant, posterior.best)
     found = []
     for c in clear:
-        channel, share = _where(arena, c.own, fit)
-        if channel is not None:
-            found.append(described(arena, posterior, posterior.gram, fit, c, channel, share, seed))
-    return tuple(r for r in found if r.cosine <= SAME)
+        is_large, share, channel = _where(arena, c.own, fit)
+        form = described(arena, posterior, posterior.gram, fit, c, channel, share, seed)
+        usual = WORTH * arena.shapes[arena.blocks[c.first].tag].mechanism.allowed
+        is_large |= not form.manner and bool(np.nan_to_num(np.maximum(form.low, -form.high)).max() >= usual)
+        if share > WORTH_TELLING and is_large and form.cosine <= SAME:
+            found.append(form)
+    return tuple(found)
 
 
 def _own(arena: Arena, m: int, fit: Fitted) -> list[int]:
@@ -88,8 +93,8 @@ def _own(arena: Arena, m: int, fit: Fitted) -> list[int]:
     return [fit.columns.index(c) for c in arena.blocks[m].columns]
 
 
-def _where(arena: Arena, members: Sequence[int], fit: Fitted) -> tuple[str | None, float]:
-    """The channel of whose variance shapes explain most, and that share; None if it is not worth reporting anywhere."""
+def _where(arena: Arena, members: Sequence[int], fit: Fitted) -> tuple[bool, float, str]:
+    """Whether what shapes explain is large, the largest share of a channel's variance, and that channel."""
     before, after, made = [], [], []
     for i, p in enumerate(arena.parts):
         f = sum(
@@ -104,11 +109,10 @@ def _where(arena: Arena, members: Sequence[int], fit: Fitted) -> tuple[str | Non
     share = 1.0 - left.var(axis=1) / np.maximum(y.var(axis=1), 1e-30)
     rms = np.sqrt((f**2).mean(axis=1))
     channels = arena.parts[0].channels
-    told = [
-        (float(s), c) for s, r, c in zip(share, rms, channels, strict=True)
-        if s > WORTH_TELLING and r > LEAST[CHANNELS[c].unit]
-    ]  # fmt: skip
-    return (max(told)[1], max(told)[0]) if told else (None, 0.0)
+    large = [
+        bool(r > LEAST[CHANNELS[c].unit] and s > WORTH_TELLING) for r, s, c in zip(rms, share, channels, strict=True)
+    ]
+    return max(zip(large, share.tolist(), channels, strict=True))
 
 
 def described(

@@ -143,6 +143,12 @@ def test_a_hump_in_speed_is_a_force_over_speed(monkeypatch):
     assert r.nearest in {h.key for h in ASKED}
     assert "goes with speed" in r.sentence
     assert unknown_forms(a, p, seed=1)[0].high.tolist() == r.high.tolist()
+    # what it explains may be small where the function is large
+    monkeypatch.setattr(unexplained, "LEAST", dict.fromkeys(unexplained.LEAST, 10.0))
+    for worth, count in ((2.0, 1), (100.0, 0)):
+        monkeypatch.setattr(unexplained, "WORTH", worth)
+        assert len(unknown_forms(a, p, seed=1)) == count
+    monkeypatch.undo()
     # one that a known effect stands for is no unknown form
     for cosine, count in ((0.96, 1), (0.98, 0)):
         monkeypatch.setattr(unexplained, "_nearest", lambda *_, c=cosine: ("torque_gain", c))
