@@ -181,15 +181,12 @@ def _options(ring: _Ring, stand: _Stand, nothing: Refit) -> tuple[Option, ...]:
     enough = 1 + int(np.searchsorted(np.cumsum(sets.probability), COVERED))
     chosen = [members for members, _ in sets.sets[: min(enough, REFITTED)] if members]
     refits = [(members, _refitted(ring, stand, members, gram)) for members in chosen]
-    out = [Option(r, _evidence(ring, stand, r, members)) for members, r in [((), nothing), *refits] if not r.at_bound]
+    out = []
+    for members, r in [((), nothing), *(x for x in refits if not x[1].at_bound)]:
+        gram = inner(r.x, r.at_start, ring.passes.nuisances, stand.scatter.weight)
+        state = joined(gram, placed([ring.known[m] for m in members]), range(len(members)))
+        out.append(Option(r, state.evidence - 0.5 * float(gram[-1, -1])))
     return tuple(sorted(out, key=lambda o: -o.evidence))
-
-
-def _evidence(ring: _Ring, stand: _Stand, found: Refit, members: Members) -> float:
-    """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values."""
-    gram = inner(found.x, found.at_start, ring.passes.nuisances, stand.scatter.weight)
-    state = joined(gram, placed([ring.known[m] for m in members]), range(len(members)))
-    return state.evidence - 0.5 * float(gram[-1, -1])
 
 
 def _shapes_of(passes: Passes) -> tuple[tuple[Shape, ...], FloatArray]:
