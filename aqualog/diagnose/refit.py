@@ -47,11 +47,6 @@ class Refit:
     signatures: tuple[FloatArray, ...]
     bounded: tuple[bool, ...]
 
-    @property
-    def at_bound(self) -> bool:
-        """Whether any value sits at its physical bound."""
-        return any(self.bounded)
-
 
 @dataclass(frozen=True, slots=True)
 class Metric:

@@ -25,7 +25,7 @@ from aqualog.diagnose.evidence import Evidence, recentred
 from aqualog.diagnose.faster import faster, joined, with_rings
 from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
-from aqualog.diagnose.grade import Profile, find_profile, with_profile
+from aqualog.diagnose.grade import HILLY, Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
@@ -223,7 +223,7 @@ def _led(drive: Drive, model: Model) -> FloatArray:
 
 def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
     cause, own = road.cause, outcome.causes
-    if not road.is_large or cause.probability < SURE:
+    if road.rms.value < HILLY or cause.probability < SURE:
         small, unsure = (
             "Significant, but too small to be worth naming",
             f"Probability {cause.probability:.2f}, not named",

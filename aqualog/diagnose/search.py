@@ -176,7 +176,7 @@ def _repeated(arena: Arena, posterior: Posterior, model: Model) -> tuple[Arena, 
         measure = metric(arena, posterior.weighings)
         led = _led(arena, posterior, model)
         found = refit(led, best, _start(arena, posterior, posterior.best), measure, model)
-        if found is None or found.at_bound:
+        if found is None or any(found.bounded):
             break
         arena, done = _around(arena, found, best), best
         posterior = compete(arena)
@@ -255,12 +255,16 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
         own = _effects(arena, members)
         found = refit(led, own, _start(arena, posterior, members), measure, model)
         # a value at a bound that means no effect: a trailer of no mass
-        if found is None or (found.at_bound and np.any(np.abs(found.off) < 1e-12)):
+        if found is None or (any(found.bounded) and np.any(np.abs(found.off) < 1e-12)):
             return None
         return Option(members, _evidence(arena, found, own, measure, nothing), found)
 
     done = dict(zip(chosen, beside(one, chosen), strict=True))
-    within = {m: _within(m, o.refit) for m, o in done.items() if o is not None and o.refit is not None}
+    within = {}  # the members of a refitted set that are not at a physical bound; all of them if each of them is
+    for m, o in done.items():
+        if o is not None and o.refit is not None:
+            at_bound = {i for (i, _), is_at in zip(o.refit.names, o.refit.bounded, strict=True) if is_at}
+            within[m] = tuple(b for i, b in enumerate(m) if i not in at_bound) or m
     smaller = [m for m in dict.fromkeys(within.values()) if m not in done]
     done |= dict(zip(smaller, beside(one, smaller), strict=True))
     # water is not linear: without any effect, the simulator may differ from what signatures say of it
@@ -278,12 +282,6 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
             out[kept] = replace(out[kept], evidence=out[m].evidence, beyond=tuple(b for b in m if b not in kept))
     out = {m: o for m, o in out.items() if (within.get(m, m) == m if o.refit else not beyond & set(m))}
     return _levelled(evidence, arena, out, within.get(best, best), equal)
-
-
-def _within(members: Members, r: Refit) -> Members:
-    """The members of a refitted set that are not at a physical bound; all of them if each of them is."""
-    at_bound = {i for (i, _), is_at in zip(r.names, r.bounded, strict=True) if is_at}
-    return tuple(m for i, m in enumerate(members) if i not in at_bound) or members
 
 
 def _levelled(
@@ -403,5 +401,5 @@ def sharpened(found: Found, option: Option, model: Model) -> tuple[Refit | None,
         y = known.rows([x[None] for x in r.residuals])
         return float(known.inner(y, y)[0, 0])
 
-    best = option.refit if again is None or again.at_bound else min(again, option.refit, key=loss)
+    best = option.refit if again is None or any(again.bounded) else min(again, option.refit, key=loss)
     return best, loss(best)

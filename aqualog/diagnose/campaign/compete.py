@@ -170,7 +170,10 @@ def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...]
         own = [i for m in c.own for i in ring.blocks[m].columns]
         form = ring.functions[:, :, [i - k for i in own]] @ linear.mean[[linear.columns.index(i) for i in own]]
         name = ring.shapes[ring.blocks[c.first].tag].mechanism.name
-        out.append(described(ring, sets, gram, linear, c, name, _explained(passes, name, stand.y, form), seed))
+        # share of the variance, where the mechanism acts, that the form explains
+        own = _channels(passes.names)[name]
+        share = max(1.0 - float(np.nanvar((stand.y - form)[:, own]) / np.nanvar(stand.y[:, own])), 0.0)
+        out.append(described(ring, sets, gram, linear, c, name, share, seed))
     return tuple(out), stand
 
 
@@ -214,9 +217,3 @@ def _channels(names: Sequence[str]) -> dict[str, list[int]]:
     out |= {f"slip_slope_{s}": [i for i in slips if names[i][-1] == s[0]] for s in ("left", "right")}
     out[RESISTANCE] = [names.index(RESISTANCE)]
     return {n: c for n, c in out.items() if c}
-
-
-def _explained(passes: Passes, name: str, y: FloatArray, form: FloatArray) -> float:
-    """Share of the variance of `y` (g, c), where a mechanism acts, that a form (g, c) explains."""
-    c = _channels(passes.names)[name]
-    return max(1.0 - float(np.nanvar((y - form)[:, c]) / np.nanvar(y[:, c])), 0.0)

@@ -20,21 +20,18 @@ def manoeuvres(rows: Sequence[Row]) -> list[Measure]:
     cases = [r for r in rows if r.second is not None]
     can = [r for r in cases if r.second.possible]
     cannot = [r for r in cases if not r.second.possible]
-    resolved = [
-        r.second.verdict in ("named", "compound") and {c.key for c in r.second.causes} == set(r.hidden) for r in can
-    ]
     out = [
-        share(8, "resolved by the recommended run", resolved, ">= 0.95", least=20),
+        share(8, "resolved by the recommended run", [_is_resolved(r) for r in can], ">= 0.95", least=20),
         quantity(8, "separation over the median run's", [r.second.advantage for r in can], _median, ">= 2", least=20),
         share(8, "says that no run can", [r.second.name in ("none", "sensor") for r in cannot], ">= 0.95", least=10),
     ]
     for name, group in sorted(by(can, lambda r: r.second.name).items()):
-        hits = [
-            r.second.verdict in ("named", "compound") and {c.key for c in r.second.causes} == set(r.hidden)
-            for r in group
-        ]
-        out.append(share(8, f"  {name}", hits, ">= 0.95", least=5))
+        out.append(share(8, f"  {name}", [_is_resolved(r) for r in group], ">= 0.95", least=5))
     return out
+
+
+def _is_resolved(r: Row) -> bool:
+    return r.second.verdict in ("named", "compound") and {c.key for c in r.second.causes} == set(r.hidden)
 
 
 def compounds(rows: Sequence[Row]) -> list[Measure]:
@@ -42,16 +39,12 @@ def compounds(rows: Sequence[Row]) -> list[Measure]:
     pairs = [r for r in rows if r.group == "compound" and len(r.truth) == 2]
     # a case that failed has no sizes and counts
     cases = [r for r in pairs if r.error or (min(f.z for f in r.truth) >= STRONG and r.separation >= 0.3)]
-    recalled = [n in _said(r) for r in cases for n in r.hidden]
+    recalled = [n in r.names for r in cases for n in r.hidden]
     return [
-        share(9, "exact set of two", [_said(r) == set(r.hidden) for r in cases], ">= 0.85", least=100),
-        share(9, "a false member", [bool(_said(r) - set(r.hidden)) for r in cases], "<= 0.08", least=100),
+        share(9, "exact set of two", [set(r.names) == set(r.hidden) for r in cases], ">= 0.85", least=100),
+        share(9, "a false member", [bool(set(r.names) - set(r.hidden)) for r in cases], "<= 0.08", least=100),
         share(9, "members recalled", recalled, ">= 0.92", least=200),
     ]
-
-
-def _said(row: Row) -> set[str]:
-    return set(row.names)
 
 
 def gains(rows: Sequence[Row]) -> list[Measure]:
@@ -63,7 +56,9 @@ def gains(rows: Sequence[Row]) -> list[Measure]:
     nulls = [r.worse for r in rows if not r.truth and not r.error and math.isfinite(r.worse)]
     return [
         quantity(10, "share of the oracle's gain, median", shares, _median, ">= 0.95", least=50),
-        quantity(10, "share of the oracle's gain, p10", shares, _tenth, ">= 0.80", least=50),
+        quantity(
+            10, "share of the oracle's gain, p10", shares, lambda x: float(np.quantile(x, 0.1)), ">= 0.80", least=50
+        ),
         quantity(
             10,
             "worst channel's error on nulls, largest",
@@ -132,10 +127,6 @@ def speed(rows: Sequence[Row]) -> list[Measure]:
 
 def _median(x: np.ndarray) -> float:
     return float(np.median(x))
-
-
-def _tenth(x: np.ndarray) -> float:
-    return float(np.quantile(x, 0.1))
 
 
 def _largest(x: np.ndarray) -> float:
