@@ -21,10 +21,6 @@ ORDER = (
 HEAVY = ("asammdf", "mcap", "rosbags", "cantools", "plotly", "numba", "scipy", "polars", "numpy", "jinja2")
 
 
-def layer(path: Path) -> str:
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-
-
 READERS = {"core/vehicle.py": "config", "model/term.py": "config"}  # a record's `read` goes to its reader
 
 
@@ -76,7 +72,7 @@ def circles(package: str) -> list[set[str]]:
 
 @pytest.mark.parametrize("path", modules(), ids=lambda p: str(p.relative_to(PACKAGE)))
 def test_imports_point_downwards(path):
-    own = ORDER.index(layer(path))
+    own = ORDER.index(path.relative_to(PACKAGE).parts[0].removesuffix(".py"))
     reader = READERS.get(path.relative_to(PACKAGE).as_posix())
     packages = dict.fromkeys(m.split(".")[1] for m in imports(path))
     above = [name for name in packages if ORDER.index(name) > own and name != reader]

@@ -8,7 +8,6 @@ The cache never raises an error to the user. It skips what it cannot keep, disca
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import re
@@ -139,7 +138,7 @@ class SignalCache:
         try:
             self._make()
             path = self.folder / f"{_stamp()}-{key.text}-{_check(data)}.parquet"
-            write_whole(path, lambda temporary: _put(temporary, buffer))
+            write_whole(path, lambda temporary: temporary.write_bytes(buffer.getbuffer()))
             self._shrink()
         except OSError as error:
             self._tell_unwritable(error)
@@ -254,7 +253,3 @@ def _stamp() -> str:
 def _check(data: bytes | memoryview) -> str:
     """Return a check sum: Parquet has none over numbers, so a flipped bit would pass for a measured value."""
     return f"{zlib.crc32(data):08x}"
-
-
-def _put(path: Path, buffer: io.BytesIO) -> None:
-    path.write_bytes(buffer.getbuffer())

@@ -28,10 +28,9 @@ def to_parquet(signals: Signals) -> io.BytesIO:
         "quality": asdict(signals.quality),
     }
     buffer = io.BytesIO()
+    metadata = {_METADATA_KEY: json.dumps(records, default=lambda x: x.item())}  # numpy's numbers as Python's own
     # lz4: half the bytes of plain numbers, and both ways quicker than reading, writing and checking those
-    signals.frame.write_parquet(
-        buffer, compression="lz4", statistics=False, metadata={_METADATA_KEY: json.dumps(records, default=_plain)}
-    )
+    signals.frame.write_parquet(buffer, compression="lz4", statistics=False, metadata=metadata)
     return buffer
 
 
@@ -70,8 +69,3 @@ def files_of(path: Path) -> tuple[str, ...]:
 
 def _records(source: Path | io.BytesIO) -> Any:
     return json.loads(pl.read_parquet_metadata(source)[_METADATA_KEY])
-
-
-def _plain(x: Any) -> Any:
-    """Convert numbers of numpy to Python's own."""
-    return x.item()

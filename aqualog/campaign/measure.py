@@ -283,7 +283,8 @@ class Thinning:
                 fast = f["v_x_hat"] > V_LEAST
                 away[fast] = f[f"v_w_delta_{w}"][fast] / f["v_x_hat"][fast]
             out[f"slip_{w}"] = slip[w][middle]
-            out[f"slip_min_{w}"], out[f"slip_max_{w}"] = _extremes(away[span], step)
+            parts = away[span].reshape(-1, step)
+            out[f"slip_min_{w}"], out[f"slip_max_{w}"] = np.fmin.reduce(parts, axis=1), np.fmax.reduce(parts, axis=1)
             out[f"mu_{w}"] = mu[w][middle]
             out[f"spin_{w}"] = _any(self._bits[f"spin_{w}"][span], step)
             out[f"minor_{w}"] = _any(self._bits[f"minor_{w}"][span], step)
@@ -355,11 +356,6 @@ def _slips(
 def _means(x: FloatArray, step: int) -> FloatArray:
     """Mean over each step; NaN where one of its samples is."""
     return np.asarray(x.reshape(-1, step).mean(axis=1))
-
-
-def _extremes(x: FloatArray, step: int) -> tuple[FloatArray, FloatArray]:
-    parts = x.reshape(-1, step)
-    return np.fmin.reduce(parts, axis=1), np.fmax.reduce(parts, axis=1)
 
 
 def _any(bits: BoolArray, step: int) -> BoolArray:

@@ -94,7 +94,7 @@ class Place:
 
     def write(self, name: str, data: bytes | memoryview) -> None:
         """Write a file, complete or not at all. A missing folder means a missing disk: `make` creates folders."""
-        write_whole(self._folder / name, lambda temporary: _put(temporary, data), makes_folder=False)
+        write_whole(self._folder / name, lambda temporary: temporary.write_bytes(data), makes_folder=False)
 
     def remove(self, name: str) -> None:
         """Remove a file if it exists."""
@@ -124,10 +124,6 @@ class Place:
     def holds(self, path: Path) -> bool:
         """Whether a path of this machine is inside it."""
         return Path(os.path.realpath(path)).is_relative_to(os.path.realpath(self._folder))
-
-
-def _put(path: Path, data: bytes | memoryview) -> None:
-    path.write_bytes(data)
 
 
 def address_of(text: Address) -> Address:
@@ -178,12 +174,6 @@ def is_url(text: str) -> bool:
 def is_of_process(address: Address) -> bool:
     """Whether a place is in the memory of this process."""
     return str(address).lower().startswith("memory:")
-
-
-def _temporary_name(name: str) -> str:
-    """A temporary name next to a file, which `is_orphan` recognises."""
-    path = Path(name)
-    return path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}.tmp").as_posix()
 
 
 def is_orphan(name: str) -> bool:
@@ -277,7 +267,9 @@ class Remote(Place):
             if self._is_objects:
                 self._fs.pipe_file(self._path(name), bytes(data))
                 return
-            temporary = self._path(_temporary_name(name))
+            path = Path(name)  # beside it, a temporary name that `is_orphan` recognises
+            hidden = path.with_name(f".{path.stem[:40]}-{secrets.token_hex(4)}{path.suffix}.tmp")
+            temporary = self._path(hidden.as_posix())
             try:
                 self._fs.pipe_file(temporary, bytes(data))
                 self._fs.mv(temporary, self._path(name))

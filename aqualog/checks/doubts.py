@@ -117,7 +117,9 @@ def _entry_of(origins: Mapping[str, Origin], symbol: str, change: Change) -> _Re
     origin = origins.get(name)
     if origin is None:
         return _Read(Entry(symbol, (source,)), "")
-    entry = Entry(**_given(origin))
+    given: dict[str, Any] = {"channel": [origin.channel], **origin.mapped, "symbol": origin.symbol}
+    given = {k: tuple(x) if isinstance(x, list) else x for k, x in given.items()}
+    entry = Entry(**given)
     return _Read(replace(entry, symbol=symbol) if change.of else entry, origin.unit)
 
 
@@ -142,11 +144,6 @@ def _si(unit: str, radius: float) -> float:
     """Return the size of a unit in SI; of a speed at the rim as a speed of the wheel."""
     found = parse_unit(unit)
     return found.factor / radius if found.dimension == "speed" else found.factor
-
-
-def _given(origin: Origin) -> dict[str, Any]:
-    given = {"channel": [origin.channel], **origin.mapped, "symbol": origin.symbol}
-    return {k: tuple(x) if isinstance(x, list) else x for k, x in given.items()}
 
 
 def _short(x: float) -> float:

@@ -36,7 +36,8 @@ def drive_doubts(windows: Windows) -> Iterator[Doubt]:
     yield from gains or _resistance(windows)
     wrong = list(_drivetrain(windows))
     yield from wrong
-    yield from slip_doubts(windows, _driven_by_torque(windows), is_doubted=bool(wrong))
+    driven = [a for a, torque in drives(_torques(windows)).items() if torque > LEAST_DRIVE]
+    yield from slip_doubts(windows, driven[0] if len(driven) == 1 else "", is_doubted=bool(wrong))
 
 
 def _brakes(windows: Windows) -> Iterator[Doubt]:
@@ -138,12 +139,6 @@ def _slope(x: FloatArray, drag: FloatArray, y: FloatArray, good: BoolArray) -> t
 def _torques(windows: Windows) -> dict[str, FloatArray]:
     """Return the torques of the axles that the log has. [N·m]"""
     return {a: windows[name] for a in AXLES if (name := f"torque_{a}") in windows}
-
-
-def _driven_by_torque(windows: Windows) -> str:
-    """Return the one axle that the torques drive; empty if they show none, or both."""
-    driven = [a for a, torque in drives(_torques(windows)).items() if torque > LEAST_DRIVE]
-    return driven[0] if len(driven) == 1 else ""
 
 
 def _drivetrain(windows: Windows) -> Iterator[Doubt]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -69,7 +69,9 @@ def _doubts(windows: Windows) -> list[Doubt]:
     are_speeds_right = all(d.signals == ("a_x",) and d.ways for d in scales)
     scales += turning_scale_doubts(windows, are_speeds_right=are_speeds_right)
     # what hangs on a wrong scale or channel is no fault of its own: signs are judged with the scale put right
-    signs = [*sign_doubts(_scaled(windows, scales))]
+    factors = {s: c.factor for d in scales if len(d.ways) == 1 for s, c in d.ways[0].items() if s in _SCALED}
+    scaled = replace(windows, columns={n: x * factors.get(n, 1.0) for n, x in windows.columns.items()})
+    signs = [*sign_doubts(scaled)]
     offsets = [*offset_doubts(windows)]
     absurd = {d.signals for d in offsets if d.kind == "channel"} - {d.signals for d in scales}
     signs = [d for d in signs if d.signals not in absurd]
@@ -79,9 +81,3 @@ def _doubts(windows: Windows) -> list[Doubt]:
     # one exchange of wheels at a time: lines for two of them would not fit each other
     wheels = sorted((d for d in found if is_of_wheels(d)), key=in_turn)
     return [d for d in found if d not in wheels[1:]]
-
-
-def _scaled(windows: Windows, scales: Sequence[Doubt]) -> Windows:
-    """Return the windows with the yaw rate and a_y in the scale that the doubts give them."""
-    factors = {s: c.factor for d in scales if len(d.ways) == 1 for s, c in d.ways[0].items() if s in _SCALED}
-    return replace(windows, columns={n: x * factors.get(n, 1.0) for n, x in windows.columns.items()})

@@ -242,7 +242,9 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     values = identified_values(calibration.parameters, vehicle)
     name = new.name.replace("\\", "").replace('"', "")
     drives = ", ".join(_plain(d.name) for d in calibration.drives)
-    lines = [f"# calibrated from {drives}", f'name = "{name}"', _drivetrain(new), *arm_lines(new)]
+    # a comment where the driven axle is not known, so that no assumption looks given
+    axle = f'drivetrain = "{new.drivetrain}"' if new.knows_drivetrain else '# drivetrain: SET "rwd", "fwd" or "awd"'
+    lines = [f"# calibrated from {drives}", f'name = "{name}"', axle, *arm_lines(new)]
     section = ""
     for key in KEYS.values():
         if key.section != section:
@@ -278,11 +280,6 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     if calibration.cannot_tell:
         lines += ["", "# what the drives could not identify", *(f"# - {_plain(s)}" for s in calibration.cannot_tell)]
     return "\n".join(lines) + "\n"
-
-
-def _drivetrain(car: Vehicle) -> str:
-    """The line of the driven axle: a comment where it is not known, so that no assumption looks given."""
-    return f'drivetrain = "{car.drivetrain}"' if car.knows_drivetrain else '# drivetrain: SET "rwd", "fwd" or "awd"'
 
 
 def _source(p: Parameter) -> str:

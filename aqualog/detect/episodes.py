@@ -109,11 +109,14 @@ def episodes_of(events: Sequence[Event], way: Stretch) -> tuple[Episode, ...]:
     made += [_episode(group, way, _span(group)) for group in _groups(alone, GAP_S)]
     for group in _groups([x for x in numbered if _is_braking(x[1])], BRAKING_GAP_S):
         start, end = _span(group)
-        host = next((i for i, x in enumerate(made) if _is_wet_at(x, start, end)), None)
+        wet = (i for i, x in enumerate(made) if x.kind == "aquaplaning" and start < x.end_s and end > x.start_s)
+        host = next(wet, None)
         if host is None:
             made.append(replace(_episode(group, way, (start, end)), kind="wheel_lock"))
         else:
-            made[host] = _with(made[host], group)
+            # lock-ups within an episode change nothing else of it
+            inside = (*made[host].events, *(i for i, _ in group))
+            made[host] = replace(made[host], events=tuple(sorted(inside)))
     order = list(EPISODE_KINDS)
     return tuple(sorted(made, key=lambda x: (x.start_s, order.index(x.kind))))
 
@@ -127,15 +130,6 @@ def _is_braking(event: Event) -> bool:
 
 def _cause(event: Event) -> tuple[float, float]:
     return event.cause_s or (event.start_s, event.end_s)
-
-
-def _is_wet_at(episode: Episode, start_s: float, end_s: float) -> bool:
-    return episode.kind == "aquaplaning" and start_s < episode.end_s and end_s > episode.start_s
-
-
-def _with(episode: Episode, group: Sequence[_Numbered]) -> Episode:
-    """An episode with lock-ups that happened within it, which change nothing else of it."""
-    return replace(episode, events=tuple(sorted((*episode.events, *(i for i, _ in group)))))
 
 
 def _span(group: Iterable[_Numbered]) -> tuple[float, float]:

@@ -18,7 +18,7 @@ from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
 from aqualog.diagnose.threads import beside
 
-__all__ = ["Begun", "Fitted", "Members", "Posterior", "begin", "compete", "fitted", "rule"]
+__all__ = ["Begun", "Fitted", "Members", "Posterior", "begin", "compete", "rule"]
 
 ROUGHLY = 2  # sets that are carried on while the noise is sought
 ROUNDS = 4  # of noise, each after what the one before has found
@@ -34,11 +34,6 @@ class Posterior(Sets):
     gram: FloatArray
     tolerant: FloatArray
     weighings: tuple[Weighing, ...]
-
-
-def fitted(arena: Arena, tolerant: FloatArray, members: Sequence[int]) -> Fitted:
-    """Values of all columns of a set together."""
-    return fitted_in(arena.blocks, tolerant, members)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +86,9 @@ def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -
         tolerant = arena.tolerant(gram)
         sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram), width=ROUGHLY)
         best = max(sets, key=lambda k: sets[k])
-        coloured = [(m, fitted(arena, tolerant, m), number) for m in _first(arena, tolerant, best)]
+        coloured = [(m, fitted_in(arena.blocks, tolerant, m), number) for m in _first(arena, tolerant, best)]
         others = dict.fromkeys([*_first(arena, begun.whitely, best), *_first(arena, begun.whitely, ())[1:]])
-        white = [(m, fitted(arena, begun.whitely, m), 0) for m in others]
+        white = [(m, fitted_in(arena.blocks, begun.whitely, m), 0) for m in others]
         tried = beside(lambda s: begun.after(*s), [*coloured, *white])
         # white noise is wrong: a second step is fairer
         likeliest = max(tried[len(coloured) :], key=lambda n: n.likely)

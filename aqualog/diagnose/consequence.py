@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -64,7 +64,13 @@ def consequences(vehicle: Vehicle, model: Model, *, seed: int = 1) -> tuple[Cons
         before, after = (judge(Drive("", s, v, labels)) for s, v in known)
         return before, after
 
-    seen = beside(one, _scenarios(vehicle, seed))
+    def drawing(number: int) -> Drawing:
+        rng = np.random.default_rng([seed, number])
+        return Drawing(rng, TUNING_POOL, vehicle, TYRES["worn_summer"], P_LOW, int(rng.integers(2**31)))
+
+    scenarios = [SITUATIONS[name].make(drawing(i)).scenario for i, name in enumerate(DRY)]
+    scenarios += [_pass(drawing(len(DRY) + i), x, A_ON_LANE if i % 2 else 0.0) for i, x in enumerate(PASSES)]
+    seen = beside(one, scenarios)
     return tuple(_summed(d, own) for d in DETECTORS if (own := [p for p in seen if all(d in r.detectors for r in p)]))
 
 
@@ -88,18 +94,6 @@ def _summed(detector: str, pairs: Sequence[tuple[RunRecord, RunRecord]]) -> Cons
     return Consequence(
         detector, alarms[0], alarms[1], metres / 1e3, latency[0], latency[1], found[0], found[1], len(hits)
     )  # fmt: skip
-
-
-def _scenarios(vehicle: Vehicle, seed: int) -> Iterable[Scenario]:
-    for i, name in enumerate(DRY):
-        yield SITUATIONS[name].make(_drawing(vehicle, seed, i)).scenario
-    for i, share in enumerate(PASSES):
-        yield _pass(_drawing(vehicle, seed, len(DRY) + i), share, A_ON_LANE if i % 2 else 0.0)
-
-
-def _drawing(vehicle: Vehicle, seed: int, number: int) -> Drawing:
-    rng = np.random.default_rng([seed, number])
-    return Drawing(rng, TUNING_POOL, vehicle, TYRES["worn_summer"], P_LOW, int(rng.integers(2**31)))
 
 
 def _pass(k: Drawing, share: float, a: float) -> Scenario:

@@ -68,7 +68,9 @@ def make_evidence(
     variants = Counter((h.effect.name, h.where) for h in asked if not (h.allowed or h.effect.drive.begins_like))
     rows: list[tuple[float, ...]] = []
     kinds: list[Kind] = []
-    speed, car = _drag_speed(drives), drives[0].vehicle
+    # drag counts at this speed [m/s]: a head wind's v w is nearest to drag's v^2 by least squares there
+    v, car = np.concatenate([d.coordinates["v_x"][d.mask] for d in drives]), drives[0].vehicle
+    speed = float((v**3).sum() / max(float((v**2).sum()), 1e-9))
     for i, h in enumerate(asked):
         columns.append(tuple(range(len(rows), len(rows) + len(h.free))))
         # of one effect, which look much alike and together deviate by as much as one; moments do not
@@ -86,12 +88,6 @@ def make_evidence(
         tuple(drives), tuple(asked), tuple(residuals), flat, tuple(columns), prior, low, high, smallest, allowed,
         np.zeros(len(asked), dtype=bool), off, tuple(kinds), values,
     )  # fmt: skip
-
-
-def _drag_speed(drives: Sequence[Drive]) -> float:
-    """Speed at which drag counts: a head wind's v w is nearest to drag's v^2 by least squares there. [m/s]"""
-    v = np.concatenate([d.coordinates["v_x"][d.mask] for d in drives])
-    return float((v**3).sum() / max(float((v**2).sum()), 1e-9))
 
 
 class Forgiven(NamedTuple):

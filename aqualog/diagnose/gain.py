@@ -67,7 +67,12 @@ def measured_gain(
     if not drives[0].untorqued:
         then, now = ([_free_speed(d, m) for d in drives] for m in models[::2])
         channels.append(ChannelGain(SPEED, "m/s", math.nan, math.nan, *rms_of_both(then, now, masks)))
-    scores = [[_scores(d, r, noise) for d, r in zip(drives, own, strict=True)] for own in (alone, y)]
+
+    def scores_of(residuals: list[FloatArray]) -> list[FloatArray]:
+        own = [(d, bridged(r, d.mask), for_mask(noise, d.mask)) for d, r in zip(drives, residuals, strict=True)]
+        return [block_scores(whitened(r[None], n).reshape(r.shape), block_step(d.dt)) for d, r, n in own]
+
+    scores = [scores_of(own) for own in (alone, y)]
     won = log_score_gain(scores[0], scores[1], seed=seed)
     notes = scope(names, scores[0], scores[1], won, in_sample=in_sample)
     return Gain(tuple(channels), *won, () if in_sample else names, in_sample, consequences, notes)
@@ -90,11 +95,6 @@ def _free_speed(d: Drive, model: Model) -> FloatArray:
     # the measured speed, not the target speed, which belongs to another model
     shown = follow(d.vehicle, replace(d.course, v_x=d.speed), model, rate=FREE_RATE)
     return block_means(shown["v_x"] - d.speed, d.dt)
-
-
-def _scores(d: Drive, r: FloatArray, noise: Noise) -> FloatArray:
-    z = whitened(bridged(r, d.mask)[None], for_mask(noise, d.mask)).reshape(r.shape)
-    return block_scores(z, block_step(d.dt))
 
 
 def block_scores(z: FloatArray, dt: float) -> FloatArray:

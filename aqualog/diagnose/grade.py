@@ -24,7 +24,7 @@ from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Knots, Model, Term
 from aqualog.physics.load import G
 
-__all__ = ["Profile", "find_profile", "with_profile"]
+__all__ = ["HILLY", "Profile", "find_profile", "with_profile"]
 
 BIN_M = 25.0  # [m]
 OVER_M = 150.0  # [m] shorter waves are the car's pitching and the driver's pedal
@@ -85,11 +85,6 @@ class Profile:
         text += f"; 95 % interval {self.rms.low:.1%} to {self.rms.high:.1%}."
         values = {"grade_rms": self.rms, "grade_mean": self.mean}
         return Cause("road_grade", None, values, ("kinematic",), text, self.probability)
-
-    @property
-    def is_large(self) -> bool:
-        """Whether it is worth naming."""
-        return self.rms.value >= HILLY
 
     @property
     def probability(self) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aqualog.core.errors import ConfigError
-from aqualog.core.notation import WHEELS
+from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import channel_values
@@ -62,6 +62,14 @@ class Hypothesis:
         """`tyre_radius@fl`."""
         return self.effect.name if self.where is None else f"{self.effect.name}@{self.where}"
 
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """Wheels or axles of which it is the sum; none of one that is simulated itself."""
+        by_wheel = self.effect.drive.by_wheel
+        if "fl" not in self.effect.places or not (self.where is None or (self.where in AXLES and by_wheel)):
+            return ()
+        return AXLES.get(self.where or "", WHEELS) if by_wheel else tuple(AXLES)
+
     def parameter(self, name: str) -> Parameter:
         """One of the effect's parameters."""
         return next(p for p in self.effect.parameters if p.name == name)
@@ -71,7 +79,7 @@ class Hypothesis:
         tested."""
         if self.allowed:
             return self.parameter(name).sigma
-        if _sums(self) or (self.effect.drive.is_single and self.where is not None):
+        if self.parts or (self.effect.drive.is_single and self.where is not None):
             return 0.0  # its parts have theirs
         own = self._own_tolerance
         return self.parameter(name).smallest * TOLERANCE if own is None else own
@@ -118,7 +126,8 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             untested[effect.name] = f"no {lacks} in the log"
             continue
         free = tuple(p.name for p in effect.parameters[: effect.drive.count])
-        places = effect.drive.places or _wheel_places(effect)
+        wheels_of = WHEELS if effect.drive.by_wheel else ()
+        places = effect.drive.places or ((*wheels_of, *AXLES, None) if "fl" in effect.places else (None,))
         asked = [w for w in places if _has_signal(w, present, torque=torque)]
         if not asked:
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
@@ -145,12 +154,6 @@ def _room(effect: Effect, where: str | None, car: Vehicle, *, wheels: bool) -> f
     if effect.name == "contact_loss" and fitted is not None and fitted.source in ("calibrated", "measured"):
         return max(POWER_OF_SPEED * fitted.sd / fitted.value, TOLERANCE * effect.parameters[0].smallest)
     return OF_CHANGES if not wheels and effect.name in _OF_CHANGES and where in ("v_x", "a_x") else None
-
-
-def _wheel_places(effect: Effect) -> tuple[str | None, ...]:
-    if "fl" not in effect.places:
-        return (None,)
-    return (*WHEELS, "f", "r", None) if effect.drive.by_wheel else ("f", "r", None)
 
 
 def _has_signal(where: str | None, present: frozenset[str], *, torque: bool) -> bool:
@@ -238,31 +241,30 @@ def signatures(
     led = led_along(drive.vehicle, drive.course, model, step=ROUGH_S) if is_rough and not leads else None
     rough = residual(drive, model, step=ROUGH_S, like=led) if is_rough else base
 
-    def changed_to(model: Model, step: float) -> FloatArray:
-        return residual(drive, model, step=step, like=led if step == ROUGH_S else None)
-
     def one(h: Hypothesis) -> FloatArray:
         out = []
         step_s, start = (ROUGH_S, rough) if is_rough and not h.effect.drive.is_quick else (STEP_S, base)
+
+        def left(name: str, x: float) -> FloatArray:
+            changed = with_values(model, [(h, {name: x})])
+            return residual(drive, changed, step=step_s, like=led if step_s == ROUGH_S else None)
+
         for name in h.free:
             at, step = value_in(model, h, name), h.step(name)
             if h.effect.drive.is_shift:
                 # noise of an input, shifted one way only, would correlate with itself in the residual
                 p = h.parameter(name)
                 low, high = max(at - step, p.low), min(at + step, p.high)
-                ends = [changed_to(with_values(model, [(h, {name: x})]), step_s) for x in (low, high)]
-                out.append((ends[0] - ends[1]) / (high - low))
+                out.append((left(name, low) - left(name, high)) / (high - low))
                 continue
             try:
-                changed = with_values(model, [(h, {name: at + step})])
-                out.append((start - changed_to(changed, step_s)) / step)
+                out.append((start - left(name, at + step)) / step)
             except ConfigError:
-                changed = with_values(model, [(h, {name: at - step})])
-                out.append((changed_to(changed, step_s) - start) / step)
+                out.append((left(name, at - step) - start) / step)
         tick()
         return np.array(out)
 
-    alone = {i: h for i, h in enumerate(asked) if h.lane is None and (each or not _sums(h))}
+    alone = {i: h for i, h in enumerate(asked) if h.lane is None and (each or not h.parts)}
     done = dict(zip(alone, beside(one, alone.values()), strict=True))
     by_wheel: dict[tuple[str, str | None, tuple[tuple[str, float], ...]], FloatArray] = {
         (asked[i].effect.name, asked[i].where, tuple(asked[i].fixed.items())): x for i, x in done.items()
@@ -272,27 +274,13 @@ def signatures(
         if (name, where, ()) not in by_wheel:
             by_wheel[name, where, ()] = one(Hypothesis(EFFECTS[name], where, (EFFECTS[name].parameters[0].name,)))
     number = stretches(drive)
-    out = []
-    for i, h in enumerate(asked):
+
+    def of(i: int, h: Hypothesis) -> FloatArray:
         if i in done:
-            out.append(done[i])
-            continue
-        if h.lane is not None:
-            there = (number > 0) & ((number - 1) % MOST_LANES == h.lane)
-            out.append(by_wheel[*sources[h.effect.name], ()][:1] * there)
-            continue
-        parts = [by_wheel[h.effect.name, w, tuple(h.fixed.items())] for w in _parts(h)]
-        out.append(np.sum(parts, axis=0))
-    return out
+            return done[i]
+        if h.lane is None:
+            return np.asarray(np.sum([by_wheel[h.effect.name, w, tuple(h.fixed.items())] for w in h.parts], axis=0))
+        there = (number > 0) & ((number - 1) % MOST_LANES == h.lane)
+        return np.asarray(by_wheel[*sources[h.effect.name], ()][:1] * there)
 
-
-def _parts(h: Hypothesis) -> tuple[str, ...]:
-    if not h.effect.drive.by_wheel:
-        return ("f", "r")
-    return WHEELS if h.where is None else tuple(w for w in WHEELS if w[0] == h.where)
-
-
-def _sums(h: Hypothesis) -> bool:
-    if "fl" not in h.effect.places:
-        return False
-    return h.where is None or (h.where in ("f", "r") and h.effect.drive.by_wheel)
+    return [of(i, h) for i, h in enumerate(asked)]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from itertools import combinations
 from statistics import NormalDist
 
@@ -117,14 +116,9 @@ def _confusion(
     size = float(evidence.smallest[c])
     alike = np.linalg.lstsq(G[np.ix_(r, r)], G[r, c], rcond=1e-9)[0] * size
     sizes = (size, *(float(a) for a in alike))
-    return Confusion(key, others, lam, p_correct(lam), _relation(evidence, (i, *rivals), sizes), sizes)
-
-
-def _relation(evidence: Evidence, effects: Sequence[int], sizes: Sequence[float]) -> str:
-    """Sentence: the sizes of the rivals that look like a certain size of the effect on this log."""
     parts = []
-    for i, size in zip(effects, sizes, strict=True):
-        h = evidence.asked[i]
+    for h, x in zip((evidence.asked[j] for j in (i, *rivals)), sizes, strict=True):
         unit = h.parameter(h.free[0]).unit
-        parts.append(f"{name_of(h.effect.name, h.where)} of {quantity(size, unit, change=True)}")
-    return f"On this log {parts[0]} looks exactly like {listed(parts[1:])}."
+        parts.append(f"{name_of(h.effect.name, h.where)} of {quantity(x, unit, change=True)}")
+    relation = f"On this log {parts[0]} looks exactly like {listed(parts[1:])}."
+    return Confusion(key, others, lam, p_correct(lam), relation, sizes)

@@ -7,8 +7,8 @@ height would be one more effect.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
 
 from aqualog.diagnose.drive import Drive
 from aqualog.model.effects import EFFECTS
@@ -112,29 +112,23 @@ def fitting(effects: frozenset[str], drive: Drive) -> tuple[Run, ...]:
 
 def programme(run: Run, drive: Drive) -> Scenario:
     """A run as the scenario of a simulation with perfect sensors, with the car and the water of a drive."""
-    lanes = drive.course.lanes
-    speed, wet = tuple((t, v * KMH) for t, v in run.speed), False
+    course, speed = drive.course, tuple((t, v * KMH) for t, v in run.speed)
+    water: tuple[Lane, ...] = ()
     if run.water is not None:
-        v = _wet_speed(drive, lanes) + run.water * WET_STEP
+        on = [(course.t >= lane.start) & (course.t < lane.end) for lane in course.lanes]
+        v = float(course.v_x[sum(on, start=course.t < 0.0)].mean()) + run.water * WET_STEP
         v = v if run.water == 0 else min(max(v, WET_LEAST), WET_MOST)
-        speed, wet = ((0.0, v), (LENGTH_S, v)), run.water != 0
+        speed = ((0.0, v), (LENGTH_S, v))
+    if run.water:
+        # water and dry road in turn, as deep as on the log's stretches one after the other
+        starts = [WET_S * (1 + 2 * i) for i in range(int(LENGTH_S / (2.0 * WET_S)))]
+        turns = zip(starts, cycle(course.lanes), strict=False)
+        water = tuple(replace(lane, start=s, end=s + WET_S) for s, lane in turns)
     share = () if run.rolls is None else ((0.0, 1.0), (run.rolls, 1.0), (run.rolls + 0.5, 0.0))
     return Scenario(
         drive.vehicle, duration_s=LENGTH_S, rate_hz=min(RATE_HZ, 1.0 / drive.dt), speed=speed, steering=run.steering,
-        drive_share=share, lanes=_lanes(lanes) if wet else (), water_scatter=0.0, sensors=PERFECT,
+        drive_share=share, lanes=water, water_scatter=0.0, sensors=PERFECT,
     )  # fmt: skip
-
-
-def _wet_speed(drive: Drive, lanes: Sequence[Lane]) -> float:
-    course = drive.course
-    on = [(course.t >= lane.start) & (course.t < lane.end) for lane in lanes]
-    return float(course.v_x[sum(on, start=course.t < 0.0)].mean())
-
-
-def _lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
-    """Water and dry road in turn, as deep as on the log's stretches one after the other."""
-    starts = [WET_S * (1 + 2 * i) for i in range(int(LENGTH_S / (2.0 * WET_S)))]
-    return tuple(replace(lanes[i % len(lanes)], start=s, end=s + WET_S) for i, s in enumerate(starts))
 
 
 def turned(model: Model) -> Model:

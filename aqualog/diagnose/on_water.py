@@ -74,8 +74,19 @@ def around_water(evidence: Evidence, model: Model) -> tuple[Evidence, Term | Non
     i = best.hypothesis
     best = best_of([(i, best.off + float(k * usual[i])) for k in (-FINER, FINER)])
     h = evidence.asked[i]
-    name = h.free[0]
-    return _around(evidence, model, best), Term(h.effect, {name: value_in(model, h, name) + best.off}, h.where)
+    name, first = h.free[0], evidence.columns[i][0]
+    moved = _moved(evidence, model, h, best.off)
+    wet = [i for i, o in enumerate(evidence.asked) if o.of_water]
+    columns = [c for i in wet for c in evidence.columns[i]]
+    all_signatures, residuals = [], []
+    for d, s, r in zip(evidence.drives, evidence.signatures, best.residuals, strict=True):
+        changed = s.copy()
+        changed[columns] = np.concatenate(signatures(d, moved, [evidence.asked[i] for i in wet], base=r))
+        all_signatures.append(changed)
+        residuals.append(r + best.off * changed[first])
+    drives = tuple(rolling_under(d, moved) for d in evidence.drives)
+    around = replace(evidence, drives=drives, signatures=tuple(all_signatures), residuals=tuple(residuals))
+    return around, Term(h.effect, {name: value_in(model, h, name) + best.off}, h.where)
 
 
 def _moved(evidence: Evidence, model: Model, h: Hypothesis, off: float) -> Model:
@@ -94,19 +105,3 @@ def _surprise(evidence: Evidence, residuals: Sequence[FloatArray]) -> float:
         weighing([r], d.mask, contrasts(d.channels)).surprise(r)
         for r, d in zip(residuals, evidence.drives, strict=True)
     )
-
-
-def _around(evidence: Evidence, model: Model, best: _Tried) -> Evidence:
-    h = evidence.asked[best.hypothesis]
-    moved = _moved(evidence, model, h, best.off)
-    wet = [i for i, o in enumerate(evidence.asked) if o.of_water]
-    columns = [c for i in wet for c in evidence.columns[i]]
-    first = evidence.columns[best.hypothesis][0]
-    all_signatures, residuals = [], []
-    for d, s, r in zip(evidence.drives, evidence.signatures, best.residuals, strict=True):
-        changed = s.copy()
-        changed[columns] = np.concatenate(signatures(d, moved, [evidence.asked[i] for i in wet], base=r))
-        all_signatures.append(changed)
-        residuals.append(r + best.off * changed[first])
-    drives = tuple(rolling_under(d, moved) for d in evidence.drives)
-    return replace(evidence, drives=drives, signatures=tuple(all_signatures), residuals=tuple(residuals))

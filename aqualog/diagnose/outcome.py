@@ -11,13 +11,14 @@ import numpy as np
 from aqualog.core.intervals import Z95
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
-from aqualog.diagnose.compete import Members, Posterior, fitted
+from aqualog.diagnose.compete import Members, Posterior
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.noise import Noise, bridged, whitened
 from aqualog.diagnose.records import SURE, Cause, Estimate, tempered
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import DOUBT, Found, Option, sharpened
+from aqualog.diagnose.sets import fitted_in
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, Outcome, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence, name_of
@@ -62,16 +63,9 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
     d = decided(sets, lambda group: _at_place(found, group, model), failing)
     if d.verdict == "cannot_tell" and not d.alternatives and d.best and not _is_gain(found, d.best.option.refit):
         return Outcome("no_effect", notes=d.notes)
-    return d._replace(notes=d.notes + _beyond(found.arena, d.best.option)) if d.best else d
-
-
-def _beyond(arena: Arena, option: Option) -> tuple[str, ...]:
-    """Sentences about effects that would stand at a physical bound beside an option."""
-    beside = [arena.evidence.asked[arena.blocks[b].tag] for b in option.beyond]
-    return tuple(
-        f"Not named: {name_of(h.effect.name, h.where)} would stand at its physical bound. Something else acts there."
-        for h in beside
-    )
+    beyond = [found.arena.evidence.asked[found.arena.blocks[b].tag] for b in d.best.option.beyond] if d.best else []
+    told = "would stand at its physical bound. Something else acts there."
+    return d._replace(notes=(*d.notes, *(f"Not named: {name_of(h.effect.name, h.where)} {told}" for h in beyond)))
 
 
 def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) -> Candidate[Option]:
@@ -112,7 +106,7 @@ def _linear(arena: Arena, posterior: Posterior, members: Members, model: Model) 
     """The known effects of a set with their values in the competition, and whether each is worth naming."""
     if not members:
         return []
-    fit = fitted(arena, posterior.tolerant, members)
+    fit = fitted_in(arena.blocks, posterior.tolerant, members)
     sd = np.sqrt(np.diag(fit.covariance)) * arena.sd[fit.columns]
     mean = fit.mean * arena.sd[fit.columns]
     out = []

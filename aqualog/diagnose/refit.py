@@ -47,11 +47,6 @@ class Refit:
     signatures: tuple[FloatArray, ...]
     bounded: tuple[bool, ...]
 
-    @property
-    def at_bound(self) -> bool:
-        """Whether any value sits at its physical bound."""
-        return any(self.bounded)
-
 
 @dataclass(frozen=True, slots=True)
 class Metric:
@@ -150,6 +145,24 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
     `chosen`: hypotheses of the set; `start` (k,): changes of their values with which the search starts; `measure`: held
     fixed, so that sets can be compared; `model`: on which the set comes.
     """
+
+    def tried_at(values: FloatArray) -> tuple[FloatArray, list[FloatArray], Model] | None:
+        own = list(zip(names, values.tolist(), strict=True))
+        by_member = [(h, {n: v for (o, n), v in own if o == i}) for i, h in enumerate(members)]
+        try:
+            extended = with_values(model, by_member)
+            residuals = [residual(d, extended) for d in evidence.drives]
+        except ConfigError:
+            return None
+        return measure.rows([r[None] for r in residuals])[0], residuals, extended
+
+    def loss_of(y: FloatArray, off: FloatArray) -> float:
+        return float(measure.inner(y[None], y[None])[0, 0] + off @ off)
+
+    def slopes(residuals: Sequence[FloatArray], extended: Model) -> tuple[FloatArray, ...]:
+        own = zip(evidence.drives, residuals, strict=True)
+        return tuple(np.concatenate(signatures(d, extended, members, base=r, each=True)) for d, r in own)
+
     members = tuple(evidence.asked[m] for m in chosen)
     names = tuple((i, n) for i, h in enumerate(members) for n in h.free)
     columns = [c for m in chosen for c in evidence.columns[m]]
@@ -160,13 +173,13 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
     for shrink in SHRINK:
         # slip goes with one over the slip stiffness: half of it left is, by a straight line, nothing left
         values = np.clip(base + shrink * start, low, high)
-        found = _try(evidence, members, names, values, measure, model)
+        found = tried_at(values)
         if found is not None:
             break
     else:
         return None
     y, residuals, extended = found
-    loss = _loss(measure, y, (values - base) / width)
+    loss = loss_of(y, (values - base) / width)
     fresh, here = False, None  # whether J still predicts; the slopes, where they were simulated at these values
     for _ in range(ROUNDS):
         P = np.diag(width**-2.0)
@@ -176,10 +189,10 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
         won = 0.0
         for shrink in SHRINK if promised >= ENOUGH else ():
             new = np.clip(values + shrink * step, low, high)
-            tried = _try(evidence, members, names, new, measure, model)
+            tried = tried_at(new)
             if tried is None:
                 continue
-            won = loss - _loss(measure, tried[0], (new - base) / width)
+            won = loss - loss_of(tried[0], (new - base) / width)
             if won > 0.0:
                 y, residuals, extended = tried
                 values, loss, here = new, loss - won, None
@@ -192,45 +205,13 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
         elif fresh:
             break
         if not fresh:
-            here = _slopes(evidence, members, residuals, extended)
+            here = slopes(residuals, extended)
             J, fresh = measure.rows(here), True
     if here is None:
-        here = _slopes(evidence, members, residuals, extended)
+        here = slopes(residuals, extended)
         J = measure.rows(here)
     covariance = np.linalg.inv(measure.inner(J, J) + np.diag(width**-2.0)) + np.diag(measure.apart[columns] ** 2)
     bounded = tuple(bool(x) for x in (values <= low + 1e-12) | (values >= high - 1e-12))
     off = values - base
     loss -= float(((off / width) ** 2).sum())
     return Refit(members, names, values, off, np.asarray(covariance), loss, extended, tuple(residuals), here, bounded)
-
-
-def _loss(measure: Metric, y: FloatArray, off: FloatArray) -> float:
-    return float(measure.inner(y[None], y[None])[0, 0] + off @ off)
-
-
-def _try(
-    evidence: Evidence,
-    members: tuple[Hypothesis, ...],
-    names: tuple[tuple[int, str], ...],
-    values: FloatArray,
-    measure: Metric,
-    model: Model,
-) -> tuple[FloatArray, list[FloatArray], Model] | None:
-    by_member: list[dict[str, float]] = [{} for _ in members]
-    for (i, n), v in zip(names, values.tolist(), strict=True):
-        by_member[i][n] = v
-    try:
-        extended = with_values(model, list(zip(members, by_member, strict=True)))
-        residuals = [residual(d, extended) for d in evidence.drives]
-    except ConfigError:
-        return None
-    return measure.rows([r[None] for r in residuals])[0], residuals, extended
-
-
-def _slopes(
-    evidence: Evidence, members: tuple[Hypothesis, ...], residuals: Sequence[FloatArray], extended: Model
-) -> tuple[FloatArray, ...]:
-    return tuple(
-        np.concatenate(signatures(d, extended, members, base=r, each=True))
-        for d, r in zip(evidence.drives, residuals, strict=True)
-    )

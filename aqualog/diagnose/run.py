@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,16 +25,16 @@ from aqualog.diagnose.evidence import Evidence, recentred
 from aqualog.diagnose.faster import faster, joined, with_rings
 from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
-from aqualog.diagnose.grade import Profile, find_profile, with_profile
+from aqualog.diagnose.grade import HILLY, Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
 from aqualog.diagnose.outcome import conclude, with_causes
-from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView, Verdict
+from aqualog.diagnose.records import SURE, Consequence, Diagnosis, Gain, Remainder, ResidualView, Verdict
 from aqualog.diagnose.refit import Refit, likeliest, metric
 from aqualog.diagnose.run_information import Rival
-from aqualog.diagnose.search import Found, Option, Tell, search, simulated
+from aqualog.diagnose.search import Option, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unknown_term import as_term, short_form
@@ -105,7 +105,9 @@ def diagnose(
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     outcome = conclude(found, model)
     chosen = outcome.best.option.refit if outcome.best else None
-    outcome, agreed = _by_drive(found, outcome, chosen)
+    agreed = () if chosen is None else agreements(found, chosen)
+    causes = tuple(widened(c, agreed) for c in outcome.causes)
+    outcome, named = outcome._replace(causes=causes), {c.key for c in causes}
     quiet = evidence.residuals if chosen is None else chosen.residuals
     noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, ready, strict=True)]
     if road is not None:
@@ -134,9 +136,16 @@ def diagnose(
         last.append(lambda: next_manoeuvre(evidence, rivals, noises, model))
     done = beside(lambda f: f(), last)
     gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
+    p, reason = found.significance.p_value, f" ({short_form(forms[0])})" if forms else ""
+    sentence = verdict_sentence(
+        outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
+        seen=p if p <= options.level else None, untested=untested | seen.untested,
+    )  # fmt: skip
+    if outcome.verdict == "no_effect" and p <= options.level:
+        notes += (f"The test found more than noise (p = {p:.2g}), but no effect large enough to be worth naming.",)
     return Diagnosis(
         verdict=outcome.verdict,
-        sentence=_sentence(outcome, found, forms, options, untested | seen.untested),
+        sentence=sentence,
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
         used_s=sum(d.used_s for d in ready),
@@ -152,26 +161,18 @@ def diagnose(
         deviations=tuple(t for t in settled.terms if t not in extended.terms),
         channels=ready[0].channels,
         untested=untested | seen.untested,
-        notes=(*notes, *_unnamed(outcome, found, options), *outcome.notes, *seen.notes),
+        notes=(*notes, *outcome.notes, *seen.notes),
         views=_views(ready, before, after) if options.views else (),
-        agreement=agreed if outcome.causes else (),
+        agreement=tuple(a for a in agreed if a.key in named),
         caution=not_calibrated(vehicle),
     )
 
 
-class _Setting(NamedTuple):
-    """What the search starts from: `bare` is the model without the road."""
-
-    evidence: Evidence
-    model: Model
-    bare: Model
-    road: Profile | None
-    untested: dict[str, str]
-    notes: tuple[str, ...]
-
-
-def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
-    """The road of a single drive first, then the effects, around values that the file is not sure of."""
+def _simulated(
+    ready: list[Drive], model: Model, tell: Tell
+) -> tuple[Evidence, Model, Model, Profile | None, dict[str, str], tuple[str, ...]]:
+    """Evidence, model, model without the road, road, effects that are not tested, and notes: the road of a single drive
+    first, then the effects, around values that the file is not sure of."""
     bare = model
     notes: tuple[str, ...] = ()
     road = find_profile(ready[0], residual(ready[0], model)) if len(ready) == 1 else None
@@ -191,18 +192,7 @@ def _simulated(ready: list[Drive], model: Model, tell: Tell) -> _Setting:
     evidence, water = around_water(evidence, model)
     if water is not None and water.effect.belongs == "tyre" and not ready[0].vehicle.water:
         notes += (f"On water the drive is likeliest with {term_words(water)}. {_WET}",)
-    return _Setting(supported(evidence), model, bare, road, untested, notes)
-
-
-def _sentence(
-    outcome: Outcome[Option], found: Found, forms: Sequence[Remainder], options: Options, untested: Mapping[str, str]
-) -> str:  # fmt: skip
-    reason = f" ({short_form(forms[0])})" if forms else ""
-    p = found.significance.p_value
-    return verdict_sentence(
-        outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
-        seen=p if p <= options.level else None, untested=untested,
-    )  # fmt: skip
+    return supported(evidence), model, bare, road, untested, notes
 
 
 def _gained(
@@ -227,31 +217,19 @@ def _gained(
     )  # fmt: skip
 
 
-def _by_drive(found: Found, outcome: Outcome[Option], r: Refit | None) -> tuple[Outcome[Option], tuple[Agreement, ...]]:
-    """Values of the chosen set drive by drive; intervals grow where the drives differ."""
-    if r is None:
-        return outcome, ()
-    agreed = agreements(found, r)
-    causes = tuple(widened(c, agreed) for c in outcome.causes)
-    named = {c.key for c in causes}
-    return outcome._replace(causes=causes), tuple(a for a in agreed if a.key in named)
-
-
 def _led(drive: Drive, model: Model) -> FloatArray:
     return residual(led_by(drive, model), model)
 
 
 def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
     cause, own = road.cause, outcome.causes
-    if not road.is_large or cause.probability < SURE:
-        sure = cause.probability >= SURE
-        note = (
-            "Significant, but too small to be worth naming"
-            if sure
-            else f"Probability {cause.probability:.2f}, not named"
+    if road.rms.value < HILLY or cause.probability < SURE:
+        small, unsure = (
+            "Significant, but too small to be worth naming",
+            f"Probability {cause.probability:.2f}, not named",
         )
-        note = f"{note}: {cause.sentence}"
-        return outcome._replace(notes=(*outcome.notes, note))
+        why = small if cause.probability >= SURE else unsure
+        return outcome._replace(notes=(*outcome.notes, f"{why}: {cause.sentence}"))
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
         # one road: a constant slope is its mean, whose interval knows that it is an offset as well
         own = tuple(c for c in own if c.effect != cause.effect)
@@ -263,13 +241,6 @@ def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
         verdict = "compound" if own else "named"
     certain = outcome.certain | {cause.effect}
     return outcome._replace(verdict=verdict, causes=(*own, cause), certain=certain)
-
-
-def _unnamed(outcome: Outcome[Option], found: Found, options: Options) -> tuple[str, ...]:
-    p = found.significance.p_value
-    if outcome.verdict != "no_effect" or p > options.level:
-        return ()
-    return (f"The test found more than noise (p = {p:.2g}), but no effect large enough to be worth naming.",)
 
 
 def _extended(
@@ -344,18 +315,14 @@ def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> 
     for d in ready:
         defect = accelerometer_defect(d)
         if defect is not None:
-            return _words(d, defect, dict(drives)[d.name])
+            origin = dict(drives)[d.name].origins.get("a_x")
+            channel = origin.channel if origin is not None else "a_x"
+            return (
+                f"a_x (channel {channel}) is not the acceleration of the car in {d.name}: the correlation of its "
+                f"changes with those of the speed is {defect.correlation:.2f}, and their ratio is {defect.gain:.2f}"
+            )
     used = sum(d.used_s for d in ready)
     return f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed" if used < LEAST_USED_S else ""
-
-
-def _words(drive: Drive, defect: Follow, signals: Signals) -> str:
-    origin = signals.origins.get("a_x")
-    channel = origin.channel if origin is not None else "a_x"
-    return (
-        f"a_x (channel {channel}) is not the acceleration of the car in {drive.name}: the correlation of its changes "
-        f"with those of the speed is {defect.correlation:.2f}, and their ratio is {defect.gain:.2f}"
-    )
 
 
 def _not_testable(
@@ -370,14 +337,11 @@ def _not_testable(
 def _views(
     drives: Sequence[Drive], before: Sequence[FloatArray], after: Sequence[FloatArray]
 ) -> tuple[ResidualView, ...]:
-    out = []
-    for d, b, a in zip(drives, before, after, strict=True):
-        for i, c in enumerate(d.channels):
-            kind = CHANNELS[c]
-            out.append(
-                ResidualView(
-                    d.name, c, kind.title, kind.unit, block_step(d.dt), d.coordinates, np.where(d.mask, b[i], np.nan),
-                    np.where(d.mask, a[i], np.nan),
-                )
-            )  # fmt: skip
-    return tuple(out)
+    """Residuals of each drive by channel, without what is left out."""
+    return tuple(
+        ResidualView(
+            d.name, c, CHANNELS[c].title, CHANNELS[c].unit, block_step(d.dt), d.coordinates,
+            *(np.where(d.mask, x[i], np.nan) for x in own),
+        )
+        for d, *own in zip(drives, before, after, strict=True) for i, c in enumerate(d.channels)
+    )  # fmt: skip

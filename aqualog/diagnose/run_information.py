@@ -73,17 +73,6 @@ class Case:
         names = self.effects
         return replace(self, tolerances=tuple(x for x in self.tolerances if x[1].allowed or x[1].effect.name in names))
 
-    @property
-    def columns(self) -> list[list[int]]:
-        """Rows of each set's own parameters and of the tolerances, behind the remainders of all sets."""
-        out, at = [], len(self.rivals)
-        total = at + sum(len(c.refit.names) for c in self.rivals)
-        for c in self.rivals:
-            k = len(c.refit.names)
-            out.append([*range(at, at + k), *range(total, total + len(self.tolerances))])
-            at += k
-        return out
-
 
 @dataclass(frozen=True, slots=True)
 class Forecast:
@@ -131,7 +120,10 @@ def forecast(case: Case, log: FloatArray, run: FloatArray, times: int, group: Fl
     means, roots = [], []
     wide = [sd for _, _, _, sd in case.tolerances]
     anew = [h.effect.belongs == "drive" and h.effect.name not in case.effects for _, h, _, _ in case.tolerances]
-    for i, (c, own) in enumerate(zip(case.rivals, case.columns, strict=True)):
+    first = len(case.rivals)  # the rows of the sets' own parameters and of the tolerances stand behind the remainders
+    for i, c in enumerate(case.rivals):
+        own = [*range(first, first + len(c.refit.names)), *range(len(log) - len(case.tolerances), len(log))]
+        first += len(c.refit.names)
         sd = [PRIOR_WIDTH * c.refit.members[m].parameter(n).sigma for m, n in c.refit.names] + wide
         spread = np.linalg.inv(log[np.ix_(own, own)] + np.diag(np.array(sd) ** -2.0))
         mean = spread @ log[own, i]

@@ -19,7 +19,7 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import Arena, known_only, make_arena
 from aqualog.diagnose.channels import CHANNELS
-from aqualog.diagnose.compete import Members, Posterior, begin, compete, fitted
+from aqualog.diagnose.compete import Members, Posterior, begin, compete
 from aqualog.diagnose.competition import COARSE, joined, placed
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import with_elements
@@ -28,6 +28,7 @@ from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_
 from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
+from aqualog.diagnose.sets import fitted_in
 from aqualog.diagnose.steps import moments
 from aqualog.diagnose.subsets import compatible, imitations
 from aqualog.diagnose.threads import beside
@@ -136,7 +137,7 @@ def search(
     tell(f"{so_far}; comparing known effects", 0.55)
     if test.p_value > level:
         return Found(test, gram, calibration, arena, posterior)
-    arena, posterior = _repeated(evidence, first, compete(first, begun=begun), model)
+    arena, posterior = _repeated(first, compete(first, begun=begun), model)
     tell(f"so far {_likeliest(arena, posterior)}; refitting in the simulator", 0.7)
     options = _refitted(evidence, arena, posterior, model)
     options = sorted(options, key=lambda o: -o.evidence)
@@ -160,14 +161,12 @@ def _effects(arena: Arena, members: Members) -> list[int]:
 
 def _start(arena: Arena, posterior: Posterior, members: Members) -> FloatArray:
     """Linear values of a set's effects, as changes. (k,)"""
-    fit = fitted(arena, posterior.tolerant, members)
+    fit = fitted_in(arena.blocks, posterior.tolerant, members)
     columns = [c for m in members for c in arena.blocks[m].columns]
     return np.asarray(fit.mean[[fit.columns.index(c) for c in columns]] * arena.sd[columns])
 
 
-def _repeated(
-    evidence: Evidence, arena: Arena, posterior: Posterior, model: Model
-) -> tuple[Arena, Posterior]:  # fmt: skip
+def _repeated(arena: Arena, posterior: Posterior, model: Model) -> tuple[Arena, Posterior]:
     """The competition around its own best set, until that stays the same."""
     done: list[int] = []
     for _ in range(AROUND):
@@ -175,22 +174,22 @@ def _repeated(
         if not best or best == done:
             break
         measure = metric(arena, posterior.weighings)
-        led = _led(evidence, arena, posterior, model)
+        led = _led(arena, posterior, model)
         found = refit(led, best, _start(arena, posterior, posterior.best), measure, model)
-        if found is None or found.at_bound:
+        if found is None or any(found.bounded):
             break
         arena, done = _around(arena, found, best), best
         posterior = compete(arena)
     return arena, posterior
 
 
-def _led(evidence: Evidence, arena: Arena, posterior: Posterior, model: Model) -> Evidence:
+def _led(arena: Arena, posterior: Posterior, model: Model) -> Evidence:
     """The evidence whose drives meet the measured speed under the best set.
 
     A set with an effect on the measured velocity is led by its own model. Without this, such an effect would get what a
     load changes of the target speed.
     """
-    best = _effects(arena, posterior.best)
+    evidence, best = arena.evidence, _effects(arena, posterior.best)
     columns = [c for h in best for c in evidence.columns[h]]
     start = _start(arena, posterior, posterior.best)
     off = iter(np.clip(start, evidence.low[columns], evidence.high[columns]).tolist())
@@ -248,19 +247,24 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
         chosen += [m for _, m in sorted(others, reverse=True) if all(arena.name(b) != name for b in m)][:1]
     chosen = [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m]
     measure = metric(arena, posterior.weighings, coarse=COARSE)
-    led = _led(evidence, arena, posterior, model)
+    led = _led(arena, posterior, model)
     y = measure.rows([r[None] for r in evidence.residuals])
     nothing = 0.5 * float(measure.inner(y, y)[0, 0])
 
     def one(members: Members) -> Option | None:
         own = _effects(arena, members)
         found = refit(led, own, _start(arena, posterior, members), measure, model)
-        if found is None or _is_nothing(found):
+        # a value at a bound that means no effect: a trailer of no mass
+        if found is None or (any(found.bounded) and np.any(np.abs(found.off) < 1e-12)):
             return None
         return Option(members, _evidence(arena, found, own, measure, nothing), found)
 
     done = dict(zip(chosen, beside(one, chosen), strict=True))
-    within = {m: _within(m, o.refit) for m, o in done.items() if o is not None and o.refit is not None}
+    within = {}  # the members of a refitted set that are not at a physical bound; all of them if each of them is
+    for m, o in done.items():
+        if o is not None and o.refit is not None:
+            at_bound = {i for (i, _), is_at in zip(o.refit.names, o.refit.bounded, strict=True) if is_at}
+            within[m] = tuple(b for i, b in enumerate(m) if i not in at_bound) or m
     smaller = [m for m in dict.fromkeys(within.values()) if m not in done]
     done |= dict(zip(smaller, beside(one, smaller), strict=True))
     # water is not linear: without any effect, the simulator may differ from what signatures say of it
@@ -280,12 +284,6 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     return _levelled(evidence, arena, out, within.get(best, best), equal)
 
 
-def _within(members: Members, r: Refit) -> Members:
-    """The members of a refitted set that are not at a physical bound; all of them if each of them is."""
-    at_bound = {i for (i, _), is_at in zip(r.names, r.bounded, strict=True) if is_at}
-    return tuple(m for i, m in enumerate(members) if i not in at_bound) or members
-
-
 def _levelled(
     evidence: Evidence, arena: Arena, options: dict[Members, Option], best: Members, equal: set[Members]
 ) -> list[Option]:
@@ -296,6 +294,7 @@ def _levelled(
     """
     top = options.get(best)
     structure = STRUCTURE * max(0.0, *(o.evidence for o in options.values()))
+    of_water = {m for m in (best, *options) if any(evidence.asked[h].of_water for h in _effects(arena, m))}
     out = []
     for members, o in options.items():
         gained = o.evidence
@@ -305,21 +304,12 @@ def _levelled(
             gained = top.evidence - 0.5 * max(o.refit.loss - top.refit.loss, 0.0)
         elif (
             # an effect in place of another; one more has no better claim than its evidence
-            top is not None
-            and members != best
-            and len(members) <= len(best)
-            and _about_water(evidence, arena, members)
-            and _about_water(evidence, arena, best)
+            top is not None and members != best and len(members) <= len(best) and {members, best} <= of_water
         ):
             gained = min(top.evidence, o.evidence + FORM * max(top.evidence, 0.0))
         more = len(best if members in equal else members) - 1
         out.append(replace(o, evidence=gained - structure * max(more, 0)))
     return out
-
-
-def _is_nothing(r: Refit) -> bool:
-    """Whether a value stands at a bound that means no effect: a trailer of no mass."""
-    return r.at_bound and bool(np.any(np.abs(r.off) < 1e-12))
 
 
 def _evidence(arena: Arena, found: Refit, own: Sequence[int], measure: Metric, nothing: float) -> float:
@@ -383,10 +373,6 @@ def _twins(evidence: Evidence, own: Sequence[int]) -> list[tuple[int, ...]]:
     return out
 
 
-def _about_water(evidence: Evidence, arena: Arena, members: Members) -> bool:
-    return any(evidence.asked[h].of_water for h in _effects(arena, members))
-
-
 def _plausible(r: Refit) -> bool:
     """Whether every value is worth naming and within three times its usual size: a huge offset is no likely rival."""
     own = [(r.members[i], r.members[i].parameter(n), n) for i, n in r.names]
@@ -415,5 +401,5 @@ def sharpened(found: Found, option: Option, model: Model) -> tuple[Refit | None,
         y = known.rows([x[None] for x in r.residuals])
         return float(known.inner(y, y)[0, 0])
 
-    best = option.refit if again is None or again.at_bound else min(again, option.refit, key=loss)
+    best = option.refit if again is None or any(again.bounded) else min(again, option.refit, key=loss)
     return best, loss(best)

@@ -108,7 +108,9 @@ def weighing(residuals: Sequence[FloatArray] | FloatArray, mask: BoolArray, cont
     cross = np.concatenate([cross[:1].real.astype(complex), cross])
     cross += 1e-6 * np.trace(cross, axis1=1, axis2=2).real[:, None, None] * np.eye(raw.shape[-1])
     root = np.linalg.cholesky(cross) * pilot[:, :, None]
-    counts = _trusted(np.arange(raw.shape[1]) / size)
+    # the share of the log-likelihood that counts: a simulator without suspension, driveline and the tyres' own motion
+    # says little of a car's fast movements
+    counts = 1.0 / (1.0 + (np.arange(raw.shape[1]) / size / (FASTEST_HZ * BLOCK_S)) ** 4)
     lines = np.full(raw.shape[1], 2.0)
     lines[0] = 1.0
     scale = np.where((np.arange(len(lines)) == 0) | (2 * np.arange(len(lines)) == size), 1.0, 2.0) / size
@@ -118,12 +120,6 @@ def weighing(residuals: Sequence[FloatArray] | FloatArray, mask: BoolArray, cont
     share = float(lines @ counts / lines.sum())
     sharpness = share * noise.sharpness + 0.5 * count / size * float((lines * counts) @ logdet)
     return Weighing(noise, mask, used, np.array([inverse.real, inverse.imag]), size, sharpness)
-
-
-def _trusted(f: FloatArray) -> FloatArray:
-    """Share of the log-likelihood that counts at frequencies f [1/sample]: a simulator without suspension, driveline
-    and the tyres' own motion says little of a car's fast movements."""
-    return np.asarray(1.0 / (1.0 + (f / (FASTEST_HZ * BLOCK_S)) ** 4))
 
 
 def _power_law(power: FloatArray) -> FloatArray:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from aqualog.core.records import BoolArray, FloatArray
 
@@ -71,11 +70,15 @@ def basis(names: tuple[str, ...], z: Sequence[FloatArray], mask: BoolArray, dt: 
     size = COLUMNS_TIME if along else COLUMNS if len(z) == 1 else COLUMNS_PAIR
     length = LENGTH_TIME if along else LENGTH if len(z) == 1 else 0.25
     axes = [_axis(x[known], size, length) for x in z]
-    points = [_points(a, x[known], POINTS if len(z) == 1 else POINTS_PAIR) for a, x in zip(axes, z, strict=True)]
+    count = POINTS if len(z) == 1 else POINTS_PAIR
+    points = [
+        np.unique(x[known]) if a.degree == 1 else np.linspace(a.knots[0], a.knots[-1], count)
+        for a, x in zip(axes, z, strict=True)
+    ]
     if any(p.size < 2 for p in points):
         return None
-    at = [_columns(a, x[known]) for a, x in zip(axes, z, strict=True)]
-    at_points = [_columns(a, p) for a, p in zip(axes, points, strict=True)]
+    at = [_splines(a, x[known]) for a, x in zip(axes, z, strict=True)]
+    at_points = [_splines(a, p) for a, p in zip(axes, points, strict=True)]
     if len(z) == 1:
         columns, on_grid, prior, grid = at[0], at_points[0], axes[0].prior, points[0][:, None]
     else:
@@ -88,8 +91,11 @@ def basis(names: tuple[str, ...], z: Sequence[FloatArray], mask: BoolArray, dt: 
         return None
     placed = np.zeros((known.size, int(visited.sum())))
     placed[known] = columns[:, visited]
-    near = _seconds_near(grid, points, [x[known] for x in z]) * dt
-    return Basis(names, placed, prior[np.ix_(visited, visited)], grid, on_grid[:, visited], near >= SUPPORT_S)
+    # samples within one and a half grid steps of each point
+    reach = [1.5 * np.diff(p).min() for p in points]
+    near = np.all([np.abs(grid[:, d : d + 1] - x[known]) <= reach[d] for d, x in enumerate(z)], axis=0)
+    supported = near.sum(axis=1) * dt >= SUPPORT_S
+    return Basis(names, placed, prior[np.ix_(visited, visited)], grid, on_grid[:, visited], supported)
 
 
 def _axis(x: FloatArray, size: int, length: float) -> _Axis:
@@ -107,35 +113,18 @@ def _axis(x: FloatArray, size: int, length: float) -> _Axis:
     return _Axis(np.concatenate([[low] * 3, inner, [high] * 3]), 3, length)
 
 
-def _columns(axis: _Axis, x: FloatArray) -> FloatArray:
-    """B-splines (n, K) at points; beyond the knots as at the last one."""
-    return _splines(axis.knots, axis.degree, np.clip(x, axis.knots[0], axis.knots[-1]))
-
-
-def _splines(knots: FloatArray, degree: int, x: FloatArray) -> FloatArray:
-    """All B-splines of a degree by the recursion of Cox and de Boor (K); an empty span counts as zero."""
+def _splines(axis: _Axis, x: FloatArray) -> FloatArray:
+    """B-splines (n, K) at points by the recursion of Cox and de Boor (K); an empty span counts as zero, and beyond the
+    knots they are as at the last one."""
+    knots = axis.knots
+    x = np.clip(x, knots[0], knots[-1])
     last = np.flatnonzero(knots < knots[-1])[-1]  # the last span holds its right end
     span = np.minimum(np.searchsorted(knots, x, side="right") - 1, last)
     out = np.zeros((x.size, knots.size - 1))
     out[np.arange(x.size), span] = 1.0
-    for k in range(1, degree + 1):
+    for k in range(1, axis.degree + 1):
         width = knots[k:] - knots[:-k]
         share = np.where(width > 0.0, (x[:, None] - knots[:-k]) / np.where(width > 0.0, width, 1.0), 0.0)
         falls = np.where(width[1:] > 0.0, 1.0 - share[:, 1:], 0.0)
         out = share[:, :-1] * out[:, :-1] + falls * out[:, 1:]
     return out
-
-
-def _points(axis: _Axis, x: FloatArray, count: int) -> FloatArray:
-    if axis.degree == 1:
-        return np.unique(x)
-    return np.linspace(axis.knots[0], axis.knots[-1], count)
-
-
-def _seconds_near(grid: FloatArray, points: list[FloatArray], z: list[FloatArray]) -> FloatArray:
-    """Samples within one and a half grid steps of each point."""
-    near: npt.NDArray[np.bool_] = np.ones((grid.shape[0], z[0].size), dtype=bool)
-    for d, x in enumerate(z):
-        reach = 1.5 * np.diff(points[d]).min()
-        near &= np.abs(grid[:, d : d + 1] - x) <= reach
-    return np.asarray(near.sum(axis=1), dtype=np.float64)

@@ -63,7 +63,11 @@ def intervals(weight: FloatArray, score: FloatArray) -> list[tuple[int, int, int
     out: list[tuple[int, int, int]] = []
     beside, known, last = np.zeros((0, n)), 0.0, 0.0
     for _ in range(INTERVALS):
-        B = np.concatenate([[0.0], np.cumsum(_left(beside, weight, score))])
+        X = np.vstack([np.ones(n), beside])
+        gram = (X * weight) @ X.T
+        gram += 1e-9 * np.trace(gram) * np.eye(len(X))
+        left = score - weight * (np.linalg.solve(gram, X @ score) @ X)
+        B = np.concatenate([[0.0], np.cumsum(left)])
         b = B[j] - B[i]
         best = int(np.argmax((b - a / A[-1] * B[-1]) ** 2 / rest))
         edges, gain = _moved(int(i[best]), int(j[best]), int(at[1]), beside, weight, score)
@@ -101,14 +105,6 @@ def _moved(
         else:
             gain, (low, high, rise) = float(each[k]), tried[k]
     return (low, high, rise), gain
-
-
-def _left(columns: FloatArray, weight: FloatArray, score: FloatArray) -> FloatArray:
-    """The score beside a constant and columns (k, n). (n,)"""
-    X = np.vstack([np.ones(weight.size), columns])
-    gram = (X * weight) @ X.T
-    gram += 1e-9 * np.trace(gram) * np.eye(len(X))
-    return np.asarray(score - weight * (np.linalg.solve(gram, X @ score) @ X))
 
 
 def trapezoid(n: int, low: int, high: int, rise: int) -> FloatArray:

@@ -72,13 +72,10 @@ def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tupl
             continue
         for two in combinations(usual.values(), 2):
             rest = {*members} - related
-            if not related <= set(two) and not any(_are_twins(asked[a], asked[b]) for a in rest for b in two):
+            pairs = [(asked[a].effect, asked[b].effect) for a in rest for b in two]
+            if not related <= set(two) and not any(b.name in a.twins or a.name in b.twins for a, b in pairs):
                 out.append(tuple(sorted(rest | set(two))))
     return list(dict.fromkeys(out))
-
-
-def _are_twins(a: Hypothesis, b: Hypothesis) -> bool:
-    return b.effect.name in a.effect.twins or a.effect.name in b.effect.twins
 
 
 def supported(evidence: Evidence) -> Evidence:

@@ -13,11 +13,11 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.any_effect import ALIKE as SAME
 from aqualog.diagnose.arena import Arena, Field
 from aqualog.diagnose.channels import CHANNELS
-from aqualog.diagnose.compete import Fitted, Posterior, fitted
+from aqualog.diagnose.compete import Fitted, Posterior
 from aqualog.diagnose.competition import Block
 from aqualog.diagnose.hypotheses import WORTH
 from aqualog.diagnose.records import SURE, Remainder, tempered
-from aqualog.diagnose.sets import Sets, evidence_of
+from aqualog.diagnose.sets import Sets, evidence_of, fitted_in
 from aqualog.diagnose.unknown_term import describe
 
 __all__ = ["Clear", "clear_forms", "described", "unknown_forms"]
@@ -76,7 +76,7 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     clear = clear_forms(arena, posterior, posterior.tolerant)
     if not clear:
         return ()
-    fit = fitted(arena, posterior.tolerant, posterior.best)
+    fit = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
     found = []
     for c in clear:
         is_large, share, channel = _where(arena, c.own, fit)
@@ -88,19 +88,14 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     return tuple(found)
 
 
-def _own(arena: Arena, m: int, fit: Fitted) -> list[int]:
-    """Where a block's columns are in a fit."""
-    return [fit.columns.index(c) for c in arena.blocks[m].columns]
-
-
 def _where(arena: Arena, members: Sequence[int], fit: Fitted) -> tuple[bool, float, str]:
     """Whether what shapes explain is large, the largest share of a channel's variance, and that channel."""
     before, after, made = [], [], []
+    blocks = [arena.blocks[m] for m in members]
+    sizes = [fit.mean[[fit.columns.index(c) for c in b.columns]] for b in blocks]
     for i, p in enumerate(arena.parts):
-        f = sum(
-            (np.tensordot(fit.mean[_own(arena, m, fit)], arena.drawn(i, arena.blocks[m]), axes=1) for m in members),
-            np.zeros_like(p.residual),
-        )[:, p.mask]
+        drawn = (np.tensordot(x, arena.drawn(i, b), axes=1) for x, b in zip(sizes, blocks, strict=True))
+        f = sum(drawn, np.zeros_like(p.residual))[:, p.mask]
         y = p.residual[:, p.mask]
         before.append(y)
         after.append(y - f)

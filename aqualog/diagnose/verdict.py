@@ -93,7 +93,10 @@ def decided(
         return Outcome("no_effect", notes=_small(ranked[0][0]) if ranked else ())
     best, group = pick(ranked[0]), tuple(ranked[0])
     own = _with_probability(best.large, marginal)
-    notes = _small(best) + _other_places(best, group)
+    # the same effects at other places that explain the log as well, or nearly so
+    near = [c for s in group if s.share * CREDIBLE > group[0].share for c in s.large]
+    here = {c.key for c in best.large}
+    notes = _small(best) + tuple(dict.fromkeys(f"Equally possible: {c.sentence}" for c in near if c.key not in here))
     failed = failing(best)
     unsure = frozenset(c.effect for c in own if c.probability < SURE)
     if not unsure and not failed:
@@ -125,12 +128,3 @@ def _with_probability(causes: Sequence[Cause], marginal: Mapping[str, float]) ->
 
 def _small(s: Candidate[Option]) -> tuple[str, ...]:
     return tuple(f"Significant, but too small to be worth naming: {c.sentence}" for c, large in s.causes if not large)
-
-
-def _other_places(best: Candidate[Option], group: Sequence[Candidate[Option]]) -> tuple[str, ...]:
-    """Sentences about the same effects at other places that explain the log as well, or nearly so."""
-    own = {c.key for c in best.large}
-    near = [s for s in group if s.share * CREDIBLE > group[0].share]
-    return tuple(
-        dict.fromkeys(f"Equally possible: {c.sentence}" for s in near for c in s.large if c.key not in own)
-    )  # fmt: skip

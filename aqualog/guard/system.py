@@ -33,7 +33,8 @@ def free_memory() -> int:
 
     A huge number where the system does not report it.
     """
-    free = [f for f in (_system_free(), _group_free(), _limit_left()) if f is not None]
+    found = _field(_MEMINFO, "MemAvailable:")
+    free = [f for f in (_installed() if found is None else found, _group_free(), _limit_left()) if f is not None]
     return max(min(free, default=_UNKNOWN), 0)
 
 
@@ -90,11 +91,6 @@ def _installed() -> int | None:
     with suppress(OSError, ValueError, AttributeError):
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     return None
-
-
-def _system_free() -> int | None:
-    found = _field(_MEMINFO, "MemAvailable:")
-    return _installed() if found is None else found
 
 
 def _group_free() -> int | None:

@@ -219,7 +219,7 @@ def full_speed(tyre: Tyre, at: Condition, criterion: str = "contact") -> float:
     if criterion == "contact":
         return min(v_full / KMH, V_MOST)
     floats = _SLOWED if criterion == "spin-down" else 1.0
-    grip = _mu(tyre) * friction_ratio(contact(tyre, at, _SPEEDS / floats))
+    grip = _car().mu_max * tyre.mu_factor * tyre.wet_friction * friction_ratio(contact(tyre, at, _SPEEDS / floats))
     resistance = _wheel_force(tyre, at, _SPEEDS / floats) / at.load + _car().rolling_resistance
     margin = grip - resistance if criterion == "spin-down" else grip + resistance - DEMAND
     return min(_crossing(0.0, margin), v_full / KMH, V_MOST)
@@ -265,10 +265,6 @@ def _car() -> Vehicle:
     return Vehicle()
 
 
-def _mu(tyre: Tyre) -> float:
-    return _car().mu_max * tyre.mu_factor * tyre.wet_friction
-
-
 def _crossing(level: float, y: FloatArray) -> float:
     """First speed at which a falling course over `_SPEEDS` reaches a level, between its points. [km/h]"""
     below = np.flatnonzero(y <= level)
@@ -277,10 +273,6 @@ def _crossing(level: float, y: FloatArray) -> float:
     i = int(below[0])
     v = np.interp(level, y[[i, max(i - 1, 0)]], _SPEEDS[[i, max(i - 1, 0)]])
     return float(v) / KMH
-
-
-def _full_speed(point: Point, tyre: Tyre) -> float:
-    return full_speed(tyre, point.at, point.criterion)
 
 
 def _share(point: Point, tyre: Tyre) -> float:
@@ -321,8 +313,9 @@ def _peak(point: Point, tyre: Tyre) -> float:
 
 
 _OF: dict[str, Callable[[Point, Tyre], float]] = {
-    "full_speed": _full_speed, "contact": _share, "fade": _fade, "drag": _drag, "drag_ratio": _drag_ratio,
-    "drag_by_speed": _by_speed, "drag_by_depth": _by_depth, "drag_peak": _peak,
+    "full_speed": lambda p, tyre: full_speed(tyre, p.at, p.criterion), "contact": _share, "fade": _fade,
+    "drag": _drag, "drag_ratio": _drag_ratio, "drag_by_speed": _by_speed, "drag_by_depth": _by_depth,
+    "drag_peak": _peak,
 }  # fmt: skip
 
 

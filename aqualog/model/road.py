@@ -8,7 +8,7 @@ import numpy as np
 
 from aqualog.core.compiled import compiled
 from aqualog.core.records import FloatArray
-from aqualog.model.scenario import Kick, Lane, Scenario, Surface
+from aqualog.model.scenario import Kick, Scenario, Surface
 from aqualog.physics.load import unevenness_rms
 
 __all__ = ["DRY", "Road", "at_position", "build_road", "rise_at", "stretch_at", "track_row"]
@@ -76,7 +76,8 @@ def build_road(scenario: Scenario, length: float) -> Road:
         lengths = [front, front, front, front, rear, rear, DEPTH_LENGTH, DEPTH_LENGTH]
         _fill(fields, CONTACT_ROAD, streams[:8], ds, lengths)
         _fill(fields, TRACK, streams[10:12], ds, [TRACK_LENGTH, TRACK_LENGTH])
-    if any(_roughness(lane) > 0 for lane in scenario.lanes):
+    surfaces = [s for lane in scenario.lanes for s in (lane.surface, lane.surface_right or lane.surface)]
+    if any(s.roughness > 0 for s in surfaces):
         _fill(fields, BUMPS, streams[8:10], ds, [BUMP_LENGTH, BUMP_LENGTH])
     if scenario.unevenness > 0.0:
         _fill(fields, HEIGHT, streams[12:], ds, [HEIGHT_LENGTH, HEIGHT_LENGTH])
@@ -90,10 +91,6 @@ def build_road(scenario: Scenario, length: float) -> Road:
 
 def _of_surface(surface: Surface) -> tuple[float, float, float, float]:
     return surface.rolling, surface.roughness, -1.0 if surface.mu is None else surface.mu, surface.compliance
-
-
-def _roughness(lane: Lane) -> float:
-    return max(lane.surface.roughness, (lane.surface_right or lane.surface).roughness)
 
 
 def _add_kick(fields: FloatArray, s: FloatArray, kick: Kick) -> None:

@@ -133,15 +133,11 @@ def curve_set(
     )  # fmt: skip
 
 
-def _step_of(v: float, limits: CurveLimits) -> float:
-    return round(v / KMH / limits.speed_step) * limits.speed_step
-
-
 def _steps(passes: Sequence[CurvePass], limits: CurveLimits) -> _Steps:
     def of(name: str) -> FloatArray:
         return np.array([float(getattr(p, name)) for p in passes])
 
-    steps = np.array([_step_of(p.v_entry, limits) for p in passes])
+    steps = np.array([round(p.v_entry / KMH / limits.speed_step) * limits.speed_step for p in passes])
     return _Steps(steps, of("v_entry"), of("a_y_least"), of("a_y_mean"), of("a_y_dry"))
 
 

@@ -158,7 +158,8 @@ def straight_run(
     highest = int(np.argmax(np.where(on_lane & np.isfinite(speeds.own), speeds.own, -np.inf)))
     is_reached = math.isfinite(at)
     stop = at if is_reached else float(highest)
-    seen = look(signals, Looked(span, raw, speeds.own, stop, is_reached, _torque(signals, vehicle)), limits)
+    torque = np.asarray(np.sum([signals.array(f"torque_{w}") for w in vehicle.driven], axis=0), dtype=np.float64)
+    seen = look(signals, Looked(span, raw, speeds.own, stop, is_reached, torque), limits)
     every = max(1, round(1.0 / (_SHOWN_HZ * dt)))
     return StraightRun(
         {n: _read(speeds.own, k) for n, k in levels.items()},
@@ -288,8 +289,3 @@ def _read(v: FloatArray, place: float) -> float:
         return math.nan
     k = min(int(place), v.size - 2)
     return float(v[k] + (place - k) * (v[k + 1] - v[k]))
-
-
-def _torque(signals: Signals, vehicle: Vehicle) -> FloatArray:
-    """Return the sum of the driven wheels' torques. [N·m] NaN where one is missing."""
-    return np.asarray(np.sum([signals.array(f"torque_{w}") for w in vehicle.driven], axis=0), dtype=np.float64)

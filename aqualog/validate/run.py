@@ -68,7 +68,8 @@ def validate(
     plan = replace(plan, plots=tuple(_widened(p, spread) for p in plan.plots))
     progress("judging")
     off = {p: [_off(t, p) for t in traces] for p in plan.plots if p.x == "t" and any(p.y in t.measured for t in traces)}
-    judged = (*(_over_time(p, traces, o) for p, o in off.items()), *_crossed(plan, traces))
+    crossed = (_cross(p, traces) for p in plan.plots if p.x != "t")
+    judged = (*(_over_time(p, traces, o) for p, o in off.items()), *(j for j in crossed if j is not None))
     all_in = [_all_within(t, [o[i] for o in off.values()]) for i, t in enumerate(traces)]
     seconds = sum(float(t.judged.sum()) * t.step for t in traces)
     within = sum(float(w[t.judged].sum()) * t.step for t, w in zip(traces, all_in, strict=True))
@@ -188,11 +189,6 @@ def _weight(w: Worst, plot: Plot) -> float:
 # --- cross plots -----------------------------------------------------------------------------------------------------
 
 
-def _crossed(plan: Plan, traces: Sequence[Trace]) -> list[Judged]:
-    plots = [p for p in plan.plots if p.x != "t"]
-    return [j for p in plots if (j := _cross(p, traces)) is not None]
-
-
 def _cross(plot: Plot, traces: Sequence[Trace]) -> Judged | None:
     """Means over bins of x, of all drives: one curve of the simulation, and the measurement within its boundaries."""
     own = [t for t in traces if plot.y in t.measured and plot.x in t.over]
@@ -260,7 +256,8 @@ def _rated(traces: Sequence[Trace], plan: Plan) -> tuple[Rated, ...]:
             if signal not in trace.measured:
                 continue
             a, b = trace.measured[signal], trace.simulated[signal]
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], _good(trace, a, b).astype(np.int8), [0]])))
+            good = trace.judged & np.isfinite(a) & np.isfinite(b)
+            edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int8), [0]])))
             for i, j in _pieces(edges, round(LONGEST_S / trace.step)):
                 if j - i >= LEAST_SAMPLES and np.ptp(a[i:j]) > least.get(signal, 0.0):
                     r = rating(a[i:j], b[i:j])
@@ -286,7 +283,3 @@ def _pieces(edges: NDArray[np.int64], most: int) -> list[tuple[int, int]]:
         cuts = np.linspace(i, j, max(1, -(-(j - i) // most)) + 1).round().astype(int).tolist()
         out += list(pairwise(cuts))
     return out
-
-
-def _good(trace: Trace, a: FloatArray, b: FloatArray) -> BoolArray:
-    return np.asarray(trace.judged & np.isfinite(a) & np.isfinite(b))

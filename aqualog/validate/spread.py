@@ -46,7 +46,7 @@ def spread_of(traces: Sequence[Trace], signal: str) -> float:
     cells: dict[tuple[bool, int], list[tuple[float, int]]] = {}
     squares, pairs, judged = 0.0, 0, 0
     for trace in traces:
-        off = _difference(trace, signal)
+        off = np.where(trace.judged, trace.measured[signal] - trace.simulated[signal], np.nan)
         good = np.isfinite(off)
         judged += int(good.sum())
         step = np.diff(off)
@@ -82,8 +82,3 @@ def _same(a: FloatArray, b: FloatArray, most: int) -> bool:
         if n and float(np.sqrt(np.mean((x[:n] - y[:n]) ** 2))) <= least:
             return True
     return False
-
-
-def _difference(trace: Trace, signal: str) -> FloatArray:
-    """Measured minus simulated, NaN where it is not judged. (m,)"""
-    return np.where(trace.judged, trace.measured[signal] - trace.simulated[signal], np.nan)

@@ -56,12 +56,10 @@ def judged(situation, seed, *, without=()):
     for symbol in units:
         if any(c.info.name == NAMES[symbol][0] for c in channels):
             p = found.get(symbol)
-            state = "missing" if p is None else "right" if _same(p.entry.unit, units[symbol]) else "wrong"
+            unit = p and p.entry.unit
+            is_same = unit is not None and parse_unit(unit) == parse_unit(units[symbol])
+            state = "missing" if p is None else "right" if is_same else "wrong"
             yield "omega" if symbol.startswith("omega") else symbol, state, bool(p and p.doubt), units[symbol]
-
-
-def _same(a, b):
-    return a is not None and parse_unit(a) == parse_unit(b)
 
 
 def main():

@@ -9,12 +9,12 @@ from pathlib import Path
 import asammdf
 import numpy as np
 import pytest
-from mcap.writer import Writer
 from typer.testing import CliRunner
 
 from aqualog.cli.main import app
 from aqualog.report.campaign.folder import safe_cell
 from tests import commands
+from tests.mcap_log import writing
 
 CAR = Path(__file__).resolve().parents[2] / "sample_logs" / "vehicle.toml"
 LONG = "y" * 100_000  # more than MOST
@@ -60,9 +60,7 @@ def table(path, name):
 
 def mcap(path, name):
     t, found = columns()
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
+    with writing(path) as writer:
         schema = writer.register_schema(name, "jsonschema", b'{"type": "object"}')
         topics = [writer.register_channel(topic, "json", schema) for topic in (f"/{name}", "car")]
         for i, second in enumerate(t):
@@ -72,7 +70,6 @@ def mcap(path, name):
                 ns = round(second * 1e9)
                 if topic == topics[1] or i % 20 == 0:  # a long name is in every message
                     writer.add_message(topic, ns, json.dumps(values).encode(), ns)
-        writer.finish()
 
 
 REFUSED = {("terminal", ".csv"), ("newline", ".csv")}  # no text, by its control characters
@@ -165,14 +162,11 @@ def test_a_link_that_leads_nowhere_is_not_replaced_without_force(tmp_path):
 
 
 def test_a_log_without_channels_says_what_was_left_out(tmp_path):
-    with (tmp_path / "a.mcap").open("wb") as file:
-        writer = Writer(file)
-        writer.start("ros2")
+    with writing(tmp_path / "a.mcap", profile="ros2") as writer:
         schema = writer.register_schema("pkg/msg/A", "ros2msg", b"float64[1000000000] a\nfloat64 v_x\n")
         topic = writer.register_channel("/t", "cdr", schema)
         for i in range(20):
             writer.add_message(topic, i * 10**7, b"\0\1\0\0" + bytes(64), i * 10**7)
-        writer.finish()
     result = CliRunner().invoke(app, ["detect", str(tmp_path / "a.mcap"), "--vehicle", str(CAR)])
     assert result.exit_code == 4
     assert "holds no channel (" in result.stderr

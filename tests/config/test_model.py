@@ -15,13 +15,6 @@ def load(folder, text):
     return load_model(folder / "model.toml")
 
 
-def refused(folder, text):
-    with pytest.raises(ConfigError) as error:
-        load(folder, text)
-    assert "\n" not in str(error.value)
-    return str(error.value)
-
-
 def test_model_file(tmp_path):
     text = """
 [[term]]
@@ -69,7 +62,10 @@ grade = 0.01
 [[tern]]
 effect = "road_grade"
 """
-    line = refused(tmp_path, text)
+    with pytest.raises(ConfigError) as error:
+        load(tmp_path, text)
+    line = str(error.value)
+    assert "\n" not in line
     for part in (
         "line 2: unknown effect 'paylod_mass' (did you mean \"payload_mass\"?)", 'line 5: unknown key "delta_mas"',
         "line 6: delta_mass = 1e+09 is outside", "line 7: payload_mass cannot sit at 'fl'; expected f, r", "line 8: term names no effect",

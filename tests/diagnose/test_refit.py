@@ -7,12 +7,13 @@ import pytest
 
 from aqualog.diagnose import search
 from aqualog.diagnose.arena import arena_of, known_only
-from aqualog.diagnose.compete import compete, fitted
+from aqualog.diagnose.compete import compete
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import Hypothesis, with_values
 from aqualog.diagnose.hypotheses import simulated as shown
 from aqualog.diagnose.refit import KNOWN, likeliest, metric, refit
 from aqualog.diagnose.search import simulated
+from aqualog.diagnose.sets import fitted_in
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 from tests.diagnose.test_drive import CAR, NOISY, signals, term
@@ -28,7 +29,7 @@ def prepared(asked, *terms, seed=3, model=Model()):  # noqa: B008 - frozen
     arena = known_only(arena_of(evidence, ()))
     posterior = compete(arena)
     members = tuple(range(len(arena.blocks)))
-    fit = fitted(arena, posterior.tolerant, members)
+    fit = fitted_in(arena.blocks, posterior.tolerant, members)
     return evidence, fit.mean * arena.sd[fit.columns], metric(arena, posterior.weighings, share=KNOWN)
 
 
@@ -52,7 +53,7 @@ def test_a_value_is_recovered_within_its_interval(hidden, h, true):
     neutral = h.parameter(h.free[0]).neutral
     assert sd < 0.1 * abs(true - neutral)
     assert abs(r.values[0] - true) < 3.0 * sd
-    assert not r.at_bound
+    assert not any(r.bounded)
     assert r.model.terms[0].values[h.free[0]] == pytest.approx(r.values[0])
 
 
@@ -67,7 +68,7 @@ def test_sets_are_refitted_where_the_simulated_car_meets_the_measured_speed_unde
     load = one("payload_mass")
     evidence, *_ = prepared([load], term("payload_mass", delta_mass=900.0))
     arena = known_only(arena_of(evidence, ()))
-    led = search._led(evidence, arena, compete(arena), Model())
+    led = search._led(arena, compete(arena), Model())
     model = with_values(Model(), [(load, {"delta_mass": 900.0})])
 
     def off(d):
@@ -116,7 +117,7 @@ def test_a_value_stops_at_its_bound():
     # a trailer cannot weigh less than nothing: a car that is lighter is no trailer
     evidence, _, measure = prepared([one("trailer"), one("aero_drag")], term("payload_mass", delta_mass=-200.0))
     r = refit(evidence, (0,), np.array([50.0]), measure, Model())
-    assert r.at_bound
+    assert any(r.bounded)
     assert r.values[0] == 0.0
 
 

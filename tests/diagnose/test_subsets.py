@@ -8,9 +8,10 @@ import pytest
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.any_effect import gains_of
 from aqualog.diagnose.arena import arena_of
-from aqualog.diagnose.compete import compete, fitted
+from aqualog.diagnose.compete import compete
 from aqualog.diagnose.evidence import make_evidence, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
+from aqualog.diagnose.sets import fitted_in
 from aqualog.diagnose.subsets import compatible
 from aqualog.model.effects import EFFECTS
 
@@ -115,7 +116,7 @@ def test_a_single_effect_is_found_with_its_value():
     b = made(torque_gain=2.0)
     arena, posterior = held(b)
     assert {arena.blocks[m].key for m in posterior.best} == {"torque_gain"}
-    fit = fitted(arena, posterior.tolerant, posterior.best)
+    fit = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
     sd = float(np.sqrt(fit.covariance[0, 0])) * arena.sd[fit.columns[0]]
     assert abs(fit.mean[0] * arena.sd[fit.columns[0]] - 0.1) < 4.0 * sd
     assert sd < 0.01

@@ -9,7 +9,6 @@ from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorP
 from google.protobuf.descriptor_pool import DescriptorPool
 from google.protobuf.message_factory import GetMessageClass
 from make_samples import HERE, START_NS, csv_columns, sample_drive, write_ros2
-from mcap.writer import Writer as McapWriter
 from rosbags.rosbag1 import Writer as Bag1Writer
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Bag2Writer
@@ -25,6 +24,7 @@ from aqualog.io.write_mcap import McapTopic, write_mcap
 from aqualog.io.write_mdf import MdfGroup, write_mf4
 from aqualog.io.write_table import TableColumn, write_csv, write_parquet
 from tests.can_log import CanMessage, write_can_mf4
+from tests.mcap_log import writing
 
 T, S = sample_drive()
 CAR = load_vehicle(HERE / "vehicle.toml")
@@ -106,15 +106,12 @@ def mcap_protobuf(tmp_path):
     pool.Add(file)
     kind = GetMessageClass(pool.FindMessageTypeByName("car.State"))
     path = tmp_path / "proto.mcap"
-    with path.open("wb") as out:
-        writer = McapWriter(out)
-        writer.start(profile="", library="test")
+    with writing(path) as writer:
         schema = writer.register_schema("car.State", "protobuf", FileDescriptorSet(file=[file]).SerializeToString())
         channel = writer.register_channel("/state", "protobuf", schema)
         for k, t in enumerate(T_NS):
             data = kind(**{n: float(x[k]) for n, x in S.items()}).SerializeToString()
             writer.add_message(channel, START_NS + int(t), data, START_NS + int(t))
-        writer.finish()
     return path, None, []
 
 

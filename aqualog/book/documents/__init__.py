@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aqualog.book.documents import campaigns, drives, judged, trade, validated
+from aqualog.book.documents import campaigns, drives, judged, trade
 from aqualog.book.documents.fields import Document
 
 __all__ = ["DOCUMENTS"]
@@ -13,7 +13,7 @@ DOCUMENTS: dict[str, Document] = {
         drives.DETECT, drives.SLIP_SLOPE, drives.INIT, drives.INSPECT, drives.DOCTOR, drives.ALIGN, drives.CALIBRATE,
         judged.DIAGNOSE, judged.EVALUATE, drives.SIMULATE, campaigns.INIT, campaigns.INSPECT, campaigns.BATCH,
         campaigns.PLAN, campaigns.BIN_SLIP_SLOPE, campaigns.BIN_RESISTANCE, trade.STRAIGHT, trade.CURVE, trade.BRAKING,
-        judged.FIGURES, judged.REPRODUCE, drives.CACHE, validated.VALIDATE, campaigns.MANIFEST,
+        judged.FIGURES, judged.REPRODUCE, drives.CACHE, judged.VALIDATE, campaigns.MANIFEST,
         campaigns.HISTORY,
     )
 }  # fmt: skip

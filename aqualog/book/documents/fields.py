@@ -174,18 +174,15 @@ def schema(document: Document) -> dict[str, Any]:
 def _object(fields: Sequence[Field], keys: Sequence[str]) -> dict[str, Any]:
     made: dict[str, Any] = {
         "type": "object",
-        "properties": {f.name: _described(f) for f in fields},
+        "properties": {
+            f.name: {**_plain(f), "description": f.meaning, **({"unit": f.unit} if f.unit else {})} for f in fields
+        },
         "required": [f.name for f in fields if f.is_always],
         "additionalProperties": False,
     }
     if keys:
         made["patternProperties"] = {k: {"type": ["string", "number", "null"]} for k in keys}
     return made
-
-
-def _described(field: Field) -> dict[str, Any]:
-    about = {"description": field.meaning, "unit": field.unit} if field.unit else {"description": field.meaning}
-    return {**_plain(field), **about}
 
 
 def _plain(field: Field) -> dict[str, Any]:

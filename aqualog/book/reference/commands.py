@@ -22,7 +22,7 @@ _PARAGRAPH = "\b"
 
 def commands_page(commands: Mapping[str, Any]) -> str:
     """The page; `commands` as the command line has them, by name."""
-    listed = [(f"[`{n}`](#aqualog-{n})", _first(c.help)) for n, c in commands.items()]
+    listed = [(f"[`{n}`](#aqualog-{n})", " ".join(c.help.split("\n\n")[0].split())) for n, c in commands.items()]
     codes = "; ".join(f"{int(c)} {meaning}" for c, (meaning, _) in MEANINGS.items())
     return page(
         "Commands",
@@ -38,10 +38,6 @@ def _with_subcommands(commands: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
     for name, command in commands.items():
         yield name, command
         yield from ((f"{name} {n}", c) for n, c in getattr(command, "commands", {}).items())
-
-
-def _first(text: str) -> str:
-    return " ".join(text.split("\n\n")[0].split())
 
 
 def _command(name: str, command: Any) -> list[str]:

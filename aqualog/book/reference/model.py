@@ -108,10 +108,19 @@ def vehicle_page() -> str:
         _PROVENANCE,
         table(("source", "meaning"), [(code(source), meaning) for source, meaning in SOURCES.items()]),
         _PROVENANCE_SD,
-        table(("key", *(s.replace("_", " ") for s in SOURCES), "why"), _deviations()),
+        table(
+            ("key", *(s.replace("_", " ") for s in SOURCES), "why"),
+            [
+                (code(path), *(_size(getattr(typical, source), KEYS[path].unit) for source in SOURCES), typical.why)
+                for path, typical in TYPICAL.items()
+            ],
+        ),
         "## Spread between drives",
         _SPREAD,
-        table(("key", "unit", "default", "meaning"), _spread()),
+        table(
+            ("key", "unit", "default", "meaning"),
+            [(code(f"spread.{n}"), KEYS[n].unit, "none", f"scatter of `{n}` between drives") for n in SPREAD],
+        ),
         "## Known faults",
         _KNOWN,
         "## How its tyres float",
@@ -139,17 +148,6 @@ def _water() -> list[tuple[str, ...]]:
         (code(f"water.{n}"), unit, "that of the tyre", f"{number(k.low)} ... {number(k.high)}", k.meaning)
         for n, unit in WATER.items()
         for k in (TYRE_KEYS[n],)
-    ]
-
-
-def _spread() -> list[tuple[str, str, str, str]]:
-    return [(code(f"spread.{n}"), KEYS[n].unit, "none", f"scatter of `{n}` between drives") for n in SPREAD]
-
-
-def _deviations() -> list[tuple[str, ...]]:
-    return [
-        (code(path), *(_size(getattr(typical, source), KEYS[path].unit) for source in SOURCES), typical.why)
-        for path, typical in TYPICAL.items()
     ]
 
 

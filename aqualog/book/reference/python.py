@@ -39,7 +39,9 @@ def python_page() -> str:
     """The page."""
     names = sorted(n for n in aqualog.__all__ if not n.startswith("__"))
     shown = [(n, getattr(aqualog, n)) for n in names]
-    listed = [(code(f"aq.{n}"), _kind(x), _first(x)) for n, x in shown]
+    listed = [
+        (code(f"aq.{n}"), k := _kind(x), "" if k == "value" else _line(inspect.getdoc(x) or "")) for n, x in shown
+    ]
     parts = [p for name, x in shown for p in _entry(name, x)]
     parts += [p for name in thesis.FUNCTIONS for p in _entry(f"thesis.{name}", getattr(thesis, name))]
     parts += _results()
@@ -50,10 +52,6 @@ def _kind(x: Any) -> str:
     if isinstance(x, ModuleType):
         return "module"
     return "class" if inspect.isclass(x) else "function" if callable(x) else "value"
-
-
-def _first(x: Any) -> str:
-    return _line(inspect.getdoc(x) or "") if _kind(x) != "value" else ""
 
 
 def _line(doc: str) -> str:

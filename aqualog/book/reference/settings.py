@@ -124,7 +124,8 @@ partial too. A detector's name marks what that detector is to see. All other wor
 def campaign_page() -> str:
     """The page."""
     top = [(code(k.name), k.kind, str(k.default), k.meaning) for k in CAMPAIGN_KEYS]
-    runs = [(code(k.name), k.kind, k.unit, _bounds(k), k.meaning) for k in RUN_KEYS.values()]
+    bounds = {n: f"{number(k.low)} ... {number(k.high)}" for n, k in RUN_KEYS.items() if k.kind == "number"}
+    runs = [(code(k.name), k.kind, k.unit, bounds.get(n, ""), k.meaning) for n, k in RUN_KEYS.items()]
     runs.append(("`x_...`", "text or number", "", "", "a key of your own"))
     groups = [(code(n), ", ".join(map(code, keys))) for n, keys in GROUP_NAMES.items()]
     labels = [(code(k.name), k.kind, k.unit, k.meaning) for k in LABEL_KEYS]
@@ -146,10 +147,6 @@ def campaign_page() -> str:
         _LABELS,
         table(("column", "type", "unit", "meaning"), labels),
     )
-
-
-def _bounds(key: Key) -> str:
-    return f"{number(key.low)} ... {number(key.high)}" if key.kind == "number" else ""
 
 
 _SCENARIO = "A scenario file says what a simulated car drives: speed, lanes of water, steering, sensors."

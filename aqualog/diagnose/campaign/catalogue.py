@@ -73,14 +73,10 @@ def library(passes: Passes, model: Model, asked: Sequence[Hypothesis], given: Mo
         (), tuple(asked), (), (), tuple(places), sigma, low, high, np.array([p.smallest for p, _ in parameters]),
         none, np.zeros(len(asked), dtype=bool), none, tuple("" for _ in sigma), none,
     )  # fmt: skip
-    return Library(evidence, np.nan_to_num(np.stack(columns, axis=-1)), expected, road * _points_of_road(passes))
-
-
-def _points_of_road(passes: Passes) -> FloatArray:
-    """Variance of a run's mean relative to one point of its lane: correlation length over distance, (g, 1)."""
-    out = np.zeros((len(passes.told), 1))
+    # variance of a run's mean relative to one point of its lane: correlation length over distance
+    of_mean = np.zeros((len(passes.told), 1))
     for r, told in enumerate(passes.told):
         if told.wet is not None:
             way = float(np.mean(told.wet.v)) * float(passes.seconds[r])
-            out[r] = min(2.0 * told.scenario.tyre_front.scatter_length / max(way, 1.0), 1.0)
-    return out
+            of_mean[r] = min(2.0 * told.scenario.tyre_front.scatter_length / max(way, 1.0), 1.0)
+    return Library(evidence, np.nan_to_num(np.stack(columns, axis=-1)), expected, road * of_mean)

@@ -170,7 +170,10 @@ def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...]
         own = [i for m in c.own for i in ring.blocks[m].columns]
         form = ring.functions[:, :, [i - k for i in own]] @ linear.mean[[linear.columns.index(i) for i in own]]
         name = ring.shapes[ring.blocks[c.first].tag].mechanism.name
-        out.append(described(ring, sets, gram, linear, c, name, _explained(passes, name, stand.y, form), seed))
+        # share of the variance, where the mechanism acts, that the form explains
+        own = _channels(passes.names)[name]
+        share = max(1.0 - float(np.nanvar((stand.y - form)[:, own]) / np.nanvar(stand.y[:, own])), 0.0)
+        out.append(described(ring, sets, gram, linear, c, name, share, seed))
     return tuple(out), stand
 
 
@@ -181,15 +184,12 @@ def _options(ring: _Ring, stand: _Stand, nothing: Refit) -> tuple[Option, ...]:
     enough = 1 + int(np.searchsorted(np.cumsum(sets.probability), COVERED))
     chosen = [members for members, _ in sets.sets[: min(enough, REFITTED)] if members]
     refits = [(members, _refitted(ring, stand, members, gram)) for members in chosen]
-    out = [Option(r, _evidence(ring, stand, r, members)) for members, r in [((), nothing), *refits] if not r.at_bound]
+    out = []
+    for members, r in [((), nothing), *(x for x in refits if not x[1].at_bound)]:
+        gram = inner(r.x, r.at_start, ring.passes.nuisances, stand.scatter.weight)
+        state = joined(gram, placed([ring.known[m] for m in members]), range(len(members)))
+        out.append(Option(r, state.evidence - 0.5 * float(gram[-1, -1])))
     return tuple(sorted(out, key=lambda o: -o.evidence))
-
-
-def _evidence(ring: _Ring, stand: _Stand, found: Refit, members: Members) -> float:
-    """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values."""
-    gram = inner(found.x, found.at_start, ring.passes.nuisances, stand.scatter.weight)
-    state = joined(gram, placed([ring.known[m] for m in members]), range(len(members)))
-    return state.evidence - 0.5 * float(gram[-1, -1])
 
 
 def _shapes_of(passes: Passes) -> tuple[tuple[Shape, ...], FloatArray]:
@@ -217,9 +217,3 @@ def _channels(names: Sequence[str]) -> dict[str, list[int]]:
     out |= {f"slip_slope_{s}": [i for i in slips if names[i][-1] == s[0]] for s in ("left", "right")}
     out[RESISTANCE] = [names.index(RESISTANCE)]
     return {n: c for n, c in out.items() if c}
-
-
-def _explained(passes: Passes, name: str, y: FloatArray, form: FloatArray) -> float:
-    """Share of the variance of `y` (g, c), where a mechanism acts, that a form (g, c) explains."""
-    c = _channels(passes.names)[name]
-    return max(1.0 - float(np.nanvar((y - form)[:, c]) / np.nanvar(y[:, c])), 0.0)

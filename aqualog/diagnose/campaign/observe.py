@@ -153,7 +153,8 @@ _NOTHING = Driven(np.zeros(1), np.zeros(1), np.zeros((4, 1)))
 
 def _nuisances(rows: Sequence[_Row], names: Sequence[str]) -> FloatArray:
     """Free sizes: a radius error of each wheel in each configuration, growth of the radii, and delay of v_x."""
-    groups = [_group(r.info) for r in rows]
+    keys = ("tyre", "pressure_front_bar", "pressure_rear_bar", "load_front_kg", "load_rear_kg")
+    groups = [(r.info.run.vehicle.stem, *(str(r.info.run.values.get(k)) for k in keys)) for r in rows]
     known = list(dict.fromkeys(groups))
     dry = [i for i, n in enumerate(names) if n.startswith("dry_")]
     width = len(known) * len(dry) + 2
@@ -165,8 +166,3 @@ def _nuisances(rows: Sequence[_Row], names: Sequence[str]) -> FloatArray:
             out[r, c, -2:] = row.grown[0], row.late[0]
             out[r, wet, -2:] = row.grown[1], row.late[1]
     return out
-
-
-def _group(info: RunInfo) -> tuple[str, ...]:
-    keys = ("tyre", "pressure_front_bar", "pressure_rear_bar", "load_front_kg", "load_rear_kg")
-    return (info.run.vehicle.stem, *(str(info.run.values.get(k)) for k in keys))

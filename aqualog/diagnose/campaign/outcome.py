@@ -47,12 +47,12 @@ def conclude(found: Found, passes: Passes, given: Model, *, seed: int) -> tuple[
     sets = candidates(
         [(o, COARSE * o.evidence) for o in found.options], lambda o: _causes(found, o.refit, passes, given)
     )  # fmt: skip
-    return decided(sets, _at_place, failing), won[0]
 
+    def at_place(group: Sequence[Candidate[Option]]) -> Candidate[Option]:
+        # the set at the whole car, unless another place is clearly better
+        return max((s for s in group if s.share * PLACES > group[0].share), key=whole)
 
-def _at_place(group: Sequence[Candidate[Option]]) -> Candidate[Option]:
-    """The set at the whole car, unless another place is clearly better."""
-    return max((s for s in group if s.share * PLACES > group[0].share), key=whole)
+    return decided(sets, at_place, failing), won[0]
 
 
 def _causes(found: Found, chosen: Refit, passes: Passes, given: Model) -> tuple[tuple[Cause, bool], ...]:

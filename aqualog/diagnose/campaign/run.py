@@ -49,7 +49,11 @@ def diagnose_campaign(
     passes = passes_of(data)
     wet = int(np.isfinite(passes.values[:, -1]).sum()) if passes.values.size else 0
     if wet < LEAST_RUNS:
-        return _not_testable(data, passes, given, wet)
+        reason = f"{wet} usable runs on water, at least {LEAST_RUNS} needed"
+        return Diagnosis(
+            "not_testable", f"Not testable: {reason}.", tuple(i.name for i in passes.infos), _driven_s(data),
+            float(passes.seconds.sum()), given, passes.names, notes=(reason, *_notes(passes)),
+        )  # fmt: skip
     asked = hypotheses(passes)
 
     def found_in(some: Passes) -> Found:
@@ -65,14 +69,6 @@ def diagnose_campaign(
             found = found_in(passes)._replace(significance=found.significance)
     progress("gain on runs left out")
     return _diagnosed(data, passes, found, *conclude(found, passes, given, seed=o.seed), o.level)
-
-
-def _not_testable(data: CampaignData, passes: Passes, given: Model, wet: int) -> Diagnosis:
-    reason = f"{wet} usable runs on water, at least {LEAST_RUNS} needed"
-    return Diagnosis(
-        "not_testable", f"Not testable: {reason}.", tuple(i.name for i in passes.infos), _driven_s(data),
-        float(passes.seconds.sum()), given, passes.names, notes=(reason, *_notes(passes)),
-    )  # fmt: skip
 
 
 def _diagnosed(
@@ -126,14 +122,9 @@ def _views(name: str, passes: Passes, before: FloatArray, after: FloatArray) -> 
     order = np.argsort(passes.coordinates["v_x"], kind="stable")
     order = order[np.isfinite(passes.values[order, -1])]
     coordinates = {k: x[order] for k, x in passes.coordinates.items()}
-    out = []
-    for c, channel in enumerate(passes.names):
-        if channel.startswith("dry_"):
-            continue
-        is_force = channel == RESISTANCE
-        title = "resistance on the water" if is_force else f"slip of {channel[-2:]} on water minus slip on dry road"
-        unit = "m/s^2" if is_force else "-"
-        out.append(
-            ResidualView(name, channel, title, unit, np.nan, coordinates, before[order, c], after[order, c])
-        )  # fmt: skip
-    return tuple(out)
+    told = {n: (f"slip of {n[-2:]} on water minus slip on dry road", "-") for n in passes.names if n[:4] != "dry_"}
+    told[RESISTANCE] = "resistance on the water", "m/s^2"
+    return tuple(
+        ResidualView(name, n, *told[n], np.nan, coordinates, before[order, c], after[order, c])
+        for c, n in enumerate(passes.names) if n in told
+    )  # fmt: skip

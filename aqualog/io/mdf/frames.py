@@ -139,17 +139,13 @@ def _variable(stored: _Octets, at: TimeArray) -> tuple[_Octets, NDArray[np.int64
     return payload, np.clip(length, 0, np.minimum(width, np.maximum(len(stored) - at - 4, 0)))
 
 
-def _stacked(parts: Sequence[_Array]) -> _Array:
-    width = max((p.shape[1] for p in parts), default=0)
-    return np.concatenate([np.pad(p, ((0, 0), (0, width - p.shape[1]))) for p in parts])
-
-
 def merged(parts: Sequence[tuple[TimeArray, _Array, _Array]], *, by_time: bool) -> tuple[TimeArray, _Array, _Array]:
     """Times, payloads and lengths of several parts below each other; by time where each part is in order."""
     if len(parts) == 1:
         return parts[0]
-    t_ns, data = np.concatenate([p[0] for p in parts]), _stacked([p[1] for p in parts])
-    length = np.concatenate([p[2] for p in parts])
+    width = max((p[1].shape[1] for p in parts), default=0)
+    data = np.concatenate([np.pad(x, ((0, 0), (0, width - x.shape[1]))) for _, x, _ in parts])
+    t_ns, length = np.concatenate([p[0] for p in parts]), np.concatenate([p[2] for p in parts])
     if by_time and all(np.all(np.diff(p[0]) >= 0) for p in parts):
         order = np.argsort(t_ns, kind="stable")
         return t_ns[order], data[order], length[order]

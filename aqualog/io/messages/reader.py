@@ -213,7 +213,8 @@ class RosReader(MessageReader):
             raise LogError("does not exist", where=str(path), hint="check the path")
         if not path.is_dir():
             return [self._open(path, Stores.ROS2_HUMBLE)]
-        release = _release(_metadata(path))
+        told = re.search(r"^[ \t]*ros_distro:\s*['\"]?(\w+)", _metadata(path), re.MULTILINE)
+        release = release_of(told[1] if told else "")
         sources: list[MessageSource] = []
         for split in _splits(path, faults):
             try:
@@ -278,11 +279,6 @@ def _metadata(path: Path) -> str:
             return file.read(_MOST_METADATA).decode(errors="replace")
     except OSError:
         return ""
-
-
-def _release(metadata: str) -> Stores:
-    found = re.search(r"^[ \t]*ros_distro:\s*['\"]?(\w+)", metadata, re.MULTILINE)
-    return release_of(found[1] if found else "")
 
 
 def _splits(path: Path, faults: FaultLog) -> list[Path]:

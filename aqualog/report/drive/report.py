@@ -182,13 +182,10 @@ def by_importance(events: Sequence[Event]) -> list[Event]:
 
     def rank(e: Event) -> tuple[Any, ...]:
         is_joint = e.detector.startswith("joint")
-        return _is_braking(e), e.severity != "full", not is_joint, e.start_s, e.detector, e.wheel or ""
+        is_braking = bool(e.evidence.get("braking_at_start"))
+        return is_braking, e.severity != "full", not is_joint, e.start_s, e.detector, e.wheel or ""
 
     return sorted(events, key=rank)
-
-
-def _is_braking(event: Event) -> bool:
-    return bool(event.evidence.get("braking_at_start"))
 
 
 # --- head ------------------------------------------------------------------------------------------------------------

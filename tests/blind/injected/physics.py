@@ -99,10 +99,6 @@ def _felt(drive: Drive) -> FloatArray:
     return np.convolve(padded, window / window.sum(), "valid")
 
 
-def _torques(drive: Drive) -> list[str]:
-    return [n for n in drive.columns if n.startswith("torque_")]
-
-
 def _share_rear(drive: Drive) -> FloatArray:
     """Share of a change of torque that goes to the rear axle."""
     car, c = drive.vehicle, drive.columns
@@ -214,7 +210,7 @@ def _grade(d: Drive, v: Values, _: str | None) -> Columns:
 
 
 def _gain_of_torque(d: Drive, v: Values, _: str | None) -> Columns:
-    return {n: d.columns[n] / v["gain"] for n in _torques(d)}
+    return {n: d.columns[n] / v["gain"] for n in d.columns if n.startswith("torque_")}
 
 
 def _delay(d: Drive, v: Values, where: str | None) -> Columns:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -12,13 +12,12 @@ import numpy as np
 from tests.blind.judging.cases import Judged
 from tests.blind.metrics import naming, worth
 from tests.blind.metrics.intervals import clopper_pearson
-from tests.blind.metrics.measure import Measure, quantity, share
+from tests.blind.metrics.measure import Measure, by, quantity, share
 
 __all__ = ["figures", "misses_text", "of_worlds", "reliability_text", "risk_coverage"]
 
 STRONG, WEAK, GAINFUL, SURE = 8.0, (3.0, 5.0), 6.0, 0.95
 EDGES = (0.0, 0.25, 0.5, 0.8, 0.9, 0.95, 1.0)
-Group = dict[str, list[Judged]]
 
 
 def figures(cases: Sequence[Judged]) -> list[Measure]:
@@ -33,7 +32,7 @@ def figures(cases: Sequence[Judged]) -> list[Measure]:
 def of_worlds(cases: Sequence[Judged]) -> list[Measure]:
     """The figures of each world by itself, without those of single effects."""
     out = []
-    for world, group in sorted(_by((c for c in cases if not c.is_baseline), lambda c: c.world).items()):
+    for world, group in sorted(by((c for c in cases if not c.is_baseline), lambda c: c.world).items()):
         few = (m for m in figures(group) if m.count and not m.name.startswith("  "))
         out += [Measure(m.number, f"{world}: {m.name}", *_rest(m)) for m in few]
     return out
@@ -43,28 +42,9 @@ def _rest(m: Measure) -> tuple[int, float, float, float, str, bool | None]:
     return m.count, m.value, m.low, m.high, m.target, m.reached
 
 
-def _by(cases: Iterable[Judged], key: Callable[[Judged], str]) -> Group:
-    groups: Group = {}
-    for c in cases:
-        groups.setdefault(key(c), []).append(c)
-    return groups
-
-
 def _singles(cases: Sequence[Judged], low: float = 0.0, high: float = math.inf) -> list[Judged]:
     """Known effects alone in a drive, of a size within these bounds."""
     return [c for c in cases if c.kind == "known" and len(c.row.truth) == 1 and low <= c.row.truth[0].z <= high]
-
-
-def _most(limit: float) -> Callable[[float, float, float], bool]:
-    return lambda v, *_: v <= limit
-
-
-def _least(limit: float) -> Callable[[float, float, float], bool]:
-    return lambda v, *_: v >= limit
-
-
-def _anything(*_: float) -> bool:
-    return True
 
 
 def false_discovery(cases: Sequence[Judged]) -> list[Measure]:
@@ -72,17 +52,17 @@ def false_discovery(cases: Sequence[Judged]) -> list[Measure]:
     nulls = [c for c in cases if c.kind == "null" and not c.row.error]
     out = [share(
         1, "false discovery, nothing hidden", [c.row.found for c in nulls],
-        lambda v, _, high: v <= 0.05 and high <= 0.075, "<= 0.05, upper bound <= 0.075", least=400, note=_said(nulls),
+        "<= 0.05, upper bound <= 0.075", accept=lambda v, _, high: v <= 0.05 and high <= 0.075, least=400, note=_said(nulls),
     )]  # fmt: skip
     for text, key in (("noise", lambda c: c.row.noise), ("drive", lambda c: c.row.programme)):
-        for name, group in sorted(_by(nulls, key).items()):
-            out.append(share(1, f"  {text} {name}", [c.row.found for c in group], _most(0.10), "<= 0.10", least=10))
+        for name, group in sorted(by(nulls, key).items()):
+            out.append(share(1, f"  {text} {name}", [c.row.found for c in group], "<= 0.10", least=10))
     return out
 
 
 def _said(cases: Sequence[Judged]) -> str:
     """What was said where it was not right, with the number of times."""
-    said = _by((c for c in cases if c.row.found or c.row.error), lambda c: _words(c))
+    said = by((c for c in cases if c.row.found or c.row.error), lambda c: _words(c))
     return ", ".join(f"{n} {len(g)}" for n, g in sorted(said.items(), key=lambda x: -len(x[1]))[:4])
 
 
@@ -98,19 +78,15 @@ def names(cases: Sequence[Judged]) -> list[Measure]:
     isolable = _isolable(strong)
     missed = [c for c in strong if not c.first_is_right]
     out = [
-        share(2, "right name first, z >= 8", [c.first_is_right for c in strong], _least(0.95), ">= 0.95", least=100, note=_missed(missed)),
-        share(2, "right name, or it and true twins", [c.is_right_or_twins for c in strong], _least(0.95), ">= 0.95", least=100),
-        share(2, "truth in the answer", [c.in_answer for c in strong], _least(0.98), ">= 0.98", least=100),
-        share(2, "right name first, forecast isolable", [c.first_is_right for c in isolable], _least(0.95), ">= 0.95", least=100),
+        share(2, "right name first, z >= 8", [c.first_is_right for c in strong], ">= 0.95", least=100, note=_missed(missed)),
+        share(2, "right name, or it and true twins", [c.is_right_or_twins for c in strong], ">= 0.95", least=100),
+        share(2, "truth in the answer", [c.in_answer for c in strong], ">= 0.98", least=100),
+        share(2, "right name first, forecast isolable", [c.first_is_right for c in isolable], ">= 0.95", least=100),
     ]  # fmt: skip
-    out.append(
-        share(2, "no effect, below the stated limit (no miss)", [c.limit_is_right for c in every], _anything, "-")
-    )
-    for effect, group in sorted(_by(strong, lambda c: c.row.truth[0].effect).items()):
+    out.append(share(2, "no effect, below the stated limit (no miss)", [c.limit_is_right for c in every], "-"))
+    for effect, group in sorted(by(strong, lambda c: c.row.truth[0].effect).items()):
         note = _missed([c for c in group if not c.first_is_right])
-        out.append(
-            share(2, f"  {effect}", [c.first_is_right for c in group], _least(0.95), ">= 0.95", least=10, note=note)
-        )
+        out.append(share(2, f"  {effect}", [c.first_is_right for c in group], ">= 0.95", least=10, note=note))
     return out
 
 
@@ -119,7 +95,7 @@ def _isolable(cases: Sequence[Judged]) -> list[Judged]:
 
 
 def _missed(cases: Sequence[Judged]) -> str:
-    said = _by(cases, _words)
+    said = by(cases, _words)
     return ", ".join(f"{n} {len(g)}" for n, g in sorted(said.items(), key=lambda x: -len(x[1]))[:4])
 
 
@@ -127,9 +103,9 @@ def wrong(cases: Sequence[Judged]) -> list[Measure]:
     """Metric 3: a name without reserve for what is not hidden."""
     strong, small = _singles(cases, STRONG), _singles(cases, 0.0, np.nextafter(STRONG, 0.0))
     return [
-        share(3, "confidently wrong, z >= 8", [c.wrong for c in strong], _most(0.01), "<= 0.01", least=100,
+        share(3, "confidently wrong, z >= 8", [c.wrong for c in strong], "<= 0.01", least=100,
               note=_said([c for c in strong if c.wrong])),
-        share(3, "confidently wrong, z < 8", [c.wrong for c in small], _most(0.03), "<= 0.03", least=100,
+        share(3, "confidently wrong, z < 8", [c.wrong for c in small], "<= 0.03", least=100,
               note=_said([c for c in small if c.wrong])),
     ]  # fmt: skip
 
@@ -139,9 +115,9 @@ def weak(cases: Sequence[Judged]) -> list[Measure]:
     few = _singles(cases, *WEAK)
     silent = [c for c in few if c.row.verdict == "no_effect"]
     return [
-        share(4, "confidently wrong at z 3 ... 5", [c.wrong for c in few], _most(0.05), "<= 0.05", least=40),
-        share(4, "truth in the answer at z 3 ... 5", [c.in_answer for c in few], _anything, "-"),
-        share(4, "no effect, and the limit holds the truth", [_below(c) for c in silent], _least(0.85), ">= 0.85", least=20),
+        share(4, "confidently wrong at z 3 ... 5", [c.wrong for c in few], "<= 0.05", least=40),
+        share(4, "truth in the answer at z 3 ... 5", [c.in_answer for c in few], "-"),
+        share(4, "no effect, and the limit holds the truth", [_below(c) for c in silent], ">= 0.85", least=20),
     ]  # fmt: skip
 
 
@@ -269,9 +245,9 @@ def gains(cases: Sequence[Judged]) -> list[Measure]:
     shares = [c.row.gain / c.row.oracle for c in some if c.row.oracle > 0.0]
     nulls = [c.row.worse for c in cases if c.kind == "null" and math.isfinite(c.row.worse)]
     return [
-        share(10, "held-out gain above zero, z >= 6", [c.gain_low > 0.0 for c in some], _least(0.80), ">= 0.80", least=20),
-        quantity(10, "share of the oracle's gain, median", shares, lambda x: float(np.median(x)), lambda v: v >= 0.95, ">= 0.95", least=20),
-        quantity(10, "worst channel's error on nulls, largest", nulls, lambda x: float(np.max(x)), lambda v: v <= 0.01, "<= +1 %", least=20),
+        share(10, "held-out gain above zero, z >= 6", [c.gain_low > 0.0 for c in some], ">= 0.80", least=20),
+        quantity(10, "share of the oracle's gain, median", shares, lambda x: float(np.median(x)), ">= 0.95", least=20),
+        quantity(10, "worst channel's error on nulls, largest", nulls, lambda x: float(np.max(x)), "<= +1 %", accept=lambda v: v <= 0.01, least=20),
     ]  # fmt: skip
 
 
@@ -279,16 +255,16 @@ def unknown(cases: Sequence[Judged]) -> list[Measure]:
     """Metric 11: forms that no effect has; those held back from development by themselves."""
     some = [c for c in cases if c.kind == "unknown"]
     out = [
-        share(11, "unexplained", [c.row.verdict == "unexplained" or c.is_accepted for c in some], _least(0.90), ">= 0.90", least=40),
-        share(11, "with the right mechanism and coordinate", [c.form_is_right for c in some], _least(0.90), ">= 0.90", least=40),
-        share(11, "with them in part", [c.form_is_near for c in some], _anything, "-"),
-        share(11, "misnamed", [c.wrong for c in some], _most(0.05), "<= 0.05", least=40,
+        share(11, "unexplained", [c.row.verdict == "unexplained" or c.is_accepted for c in some], ">= 0.90", least=40),
+        share(11, "with the right mechanism and coordinate", [c.form_is_right for c in some], ">= 0.90", least=40),
+        share(11, "with them in part", [c.form_is_near for c in some], "-"),
+        share(11, "misnamed", [c.wrong for c in some], "<= 0.05", least=40,
               note=_said([c for c in some if c.wrong])),
     ]  # fmt: skip
-    for name, group in sorted(_by(some, lambda c: str((c.unknown or {})["kind"])).items()):
+    for name, group in sorted(by(some, lambda c: str((c.unknown or {})["kind"])).items()):
         text = f"  {name}" + (", held back" if any((c.unknown or {})["held_back"] for c in group) else "")
         note = _missed([c for c in group if not c.form_is_right])
-        out.append(share(11, text, [c.form_is_right for c in group], _least(0.90), ">= 0.90", least=5, note=note))
+        out.append(share(11, text, [c.form_is_right for c in group], ">= 0.90", least=5, note=note))
     return out
 
 
@@ -297,8 +273,8 @@ def honesty(cases: Sequence[Judged]) -> list[Measure]:
     strong = _singles(cases, STRONG)
     alone = _isolable(strong)
     return [
-        share(0, "one name given, z >= 8", [c.row.single for c in strong], _anything, "-"),
-        share(0, "one name given, forecast isolable", [c.row.single for c in alone], _least(0.8), ">= 0.8", least=100),
+        share(0, "one name given, z >= 8", [c.row.single for c in strong], "-"),
+        share(0, "one name given, forecast isolable", [c.row.single for c in alone], ">= 0.8", least=100),
     ]
 
 

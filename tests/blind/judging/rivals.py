@@ -80,8 +80,8 @@ def table(cases: Sequence[Judged], said: dict[str, Said]) -> str:
         named = [_named(c, method, said[c.row.key]) for c in known]
         gains = [said[c.row.key][method].gain for c in known]
         shapes = [_formed(c, method, said[c.row.key]) for c in forms]
-        cells = [share(13, "", x, lambda *_: True, "-") for x in (found, named, shapes)]
-        cells.insert(2, quantity(13, "", gains, lambda x: float(np.median(x)), lambda _: True, "-"))
+        cells = [share(13, "", x, "-") for x in (found, named, shapes)]
+        cells.insert(2, quantity(13, "", gains, lambda x: float(np.median(x)), "-"))
         lines.append(f"| {method} | {' | '.join(map(_cell, cells))} |")
     return "\n".join(lines)
 

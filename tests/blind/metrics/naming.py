@@ -25,18 +25,16 @@ def false_discovery(rows: Sequence[Row]) -> list[Measure]:
     nulls = [r for r in rows if not r.truth and not r.error]
     out = [share(
         1, "false discovery, nothing hidden", [r.found for r in nulls],
-        lambda v, _, high: v <= 0.05 and high <= 0.075, "<= 0.05, upper bound <= 0.075", least=400,
+        "<= 0.05, upper bound <= 0.075", accept=lambda v, _, high: v <= 0.05 and high <= 0.075, least=400,
     )]  # fmt: skip
-    out.append(share(1, "p-value below its level", [r.p_value <= 0.01 for r in nulls], lambda *_: True, "-"))
+    out.append(share(1, "p-value below its level", [r.p_value <= 0.01 for r in nulls], "-"))
     cells = by(nulls, lambda r: f"{r.noise}, {r.programme}")
     if cells:
         name, worst = max(cells.items(), key=lambda c: (sum(r.found for r in c[1]) / len(c[1]), len(c[1])))
-        out.append(share(
-            1, "the worst cell", [r.found for r in worst], lambda v, *_: v <= 0.10, "<= 0.10", least=10,
-            note=f"{name}; {len(cells)} cells",
-        ))  # fmt: skip
+        note = f"{name}; {len(cells)} cells"
+        out.append(share(1, "the worst cell", [r.found for r in worst], "<= 0.10", least=10, note=note))
     for name, group in sorted(by(nulls, lambda r: r.noise).items()):
-        out.append(share(1, f"noise {name}", [r.found for r in group], lambda v, *_: v <= 0.10, "<= 0.10", least=10))
+        out.append(share(1, f"noise {name}", [r.found for r in group], "<= 0.10", least=10))
     return out
 
 
@@ -58,23 +56,13 @@ def naming(rows: Sequence[Row]) -> list[Measure]:
     effects = by(cases, lambda r: r.truth[0].effect)
     note = f"{len(effects)} effects"
     out = [
-        share(2, "right name first", [right_first(r) for r in cases], lambda v, *_: v >= 0.95, ">= 0.95", least=300, note=note),
-        share(2, "right name named or left open", [right_or_listed(r) for r in cases], lambda v, *_: v >= 0.98, ">= 0.98", least=300),
+        share(2, "right name first", [right_first(r) for r in cases], ">= 0.95", least=300, note=note),
+        share(2, "right name named or left open", [right_or_listed(r) for r in cases], ">= 0.98", least=300),
     ]  # fmt: skip
     for effect, group in sorted(effects.items()):
         places = by([r for r in group if not right_first(r)], _mistake)
         missed = ", ".join(f"{n} {len(g)}" for n, g in sorted(places.items(), key=lambda c: -len(c[1])))
-        out.append(
-            share(
-                2,
-                f"  {effect}",
-                [right_first(r) for r in group],
-                lambda v, *_: v >= 0.95,
-                ">= 0.95",
-                least=10,
-                note=missed,
-            )
-        )
+        out.append(share(2, f"  {effect}", [right_first(r) for r in group], ">= 0.95", least=10, note=missed))
     return out
 
 
@@ -87,16 +75,7 @@ def wrong_names(rows: Sequence[Row]) -> list[Measure]:
     out = []
     for group, text, most in (("named", "moderate sizes", 0.01), ("third", "30 % sizes", 0.03)):
         cases = _singles(rows, group)
-        out.append(
-            share(
-                3,
-                f"wrong and sure, {text}",
-                [r.wrong for r in cases],
-                lambda v, *_, m=most: v <= m,
-                f"<= {most}",
-                least=100,
-            )
-        )
+        out.append(share(3, f"wrong and sure, {text}", [r.wrong for r in cases], f"<= {most}", least=100))
     return out
 
 
@@ -108,24 +87,10 @@ def weak(rows: Sequence[Row]) -> list[Measure]:
     named = [r for r in at_limit if _at_smallest(r)]
     at_limit = [r for r in at_limit if not _at_smallest(r)]
     return [
-        share(4, "wrong and sure at z 3 ... 5", [r.wrong for r in cases], lambda v, *_: v <= 0.05, "<= 0.05", least=40),
-        share(4, "found at z 3 ... 5", [r.found for r in cases], lambda *_: True, "-", least=10**9),
-        share(
-            4,
-            "found at the stated limit",
-            [r.found for r in at_limit],
-            lambda v, *_: 0.85 <= v <= 0.95,
-            "0.85 ... 0.95",
-            least=40,
-        ),
-        share(
-            4,
-            "found at the smallest size worth naming",
-            [r.found for r in named],
-            lambda v, *_: v >= 0.85,
-            ">= 0.85",
-            least=20,
-        ),
+        share(4, "wrong and sure at z 3 ... 5", [r.wrong for r in cases], "<= 0.05", least=40),
+        share(4, "found at z 3 ... 5", [r.found for r in cases], "-", least=10**9),
+        share(4, "found at the stated limit", [r.found for r in at_limit], "0.85 ... 0.95", least=40),
+        share(4, "found at the smallest size worth naming", [r.found for r in named], ">= 0.85", least=20),
     ]
 
 
@@ -149,19 +114,15 @@ def coverage(rows: Sequence[Row]) -> list[Measure]:
                 if name in fact.values and math.isfinite(low + high):  # the others were not sought
                     hits.setdefault(f"{cause.effect}.{name}", []).append(low <= fact.values[name] <= high)
     every = [h for x in hits.values() for h in x]
-    out = [
-        share(
-            5, "true value within the 95 % interval", every, lambda v, *_: 0.92 <= v <= 0.98, "0.92 ... 0.98", least=100
-        )
-    ]
+    out = [share(5, "true value within the 95 % interval", every, "0.92 ... 0.98", least=100)]
     for name, x in sorted(hits.items()):
         # a cell of twenty cannot show more than that 0.92 ... 0.98 is within its exact interval
-        out.append(
-            share(
-                5, f"  {name}", x, lambda _, low, high: low <= 0.98 and high >= 0.92, "0.92 ... 0.98 within", least=10
-            )
-        )
+        out.append(share(5, f"  {name}", x, "0.92 ... 0.98 within", accept=_holds_the_level, least=10))
     return out
+
+
+def _holds_the_level(_: float, low: float, high: float) -> bool:
+    return low <= 0.98 and high >= 0.92
 
 
 def forecasts(rows: Sequence[Row]) -> list[Measure]:
@@ -205,35 +166,22 @@ def confounds(rows: Sequence[Row]) -> list[Measure]:
     twins = [r for r in rows if r.group == "twins" and not r.error]
     cases = [r for r in twins if r.truth[0].z >= STRONG and _exact(r)]
     out = [
-        share(
-            7,
-            "cannot tell, all members listed",
-            [r.verdict == "cannot_tell" and _lists(r) for r in cases],
-            lambda v, *_: v == 1.0,
-            "1.00",
-            least=20,
-        ),
-        share(7, "one name without reserve", [r.single for r in cases], lambda v, *_: v <= 0.01, "<= 0.01", least=20),
+        share(7, "cannot tell, all members listed", [_tells_not(r) for r in cases], "1.00", least=20),
+        share(7, "one name without reserve", [r.single for r in cases], "<= 0.01", least=20),
     ]
     for name, group in sorted(by(cases, lambda r: " = ".join(r.members)).items()):
         said = ", ".join(f"{n} {len(g)}" for n, g in by([r for r in group if not _lists(r)], _mistake).items())
-        out.append(
-            share(
-                7,
-                f"  {name}",
-                [r.verdict == "cannot_tell" and _lists(r) for r in group],
-                lambda v, *_: v == 1.0,
-                "1.00",
-                least=5,
-                note=said,
-            )
-        )
+        out.append(share(7, f"  {name}", [_tells_not(r) for r in group], "1.00", least=5, note=said))
     return out
 
 
 def _exact(row: Row) -> bool:
     """The twins leave next to nothing of the trace: less than noise hides, or than two simulators differ."""
     return row.separation < max(2.0, 1e-3 * row.truth[0].z ** 2)
+
+
+def _tells_not(row: Row) -> bool:
+    return row.verdict == "cannot_tell" and _lists(row)
 
 
 def _lists(row: Row) -> bool:
@@ -244,16 +192,7 @@ def _lists(row: Row) -> bool:
 def honesty(rows: Sequence[Row]) -> list[Measure]:
     """Who always abstains is never wrong: how often one name is given where it can be."""
     cases = _isolable(_singles(rows, "named"))
-    return [
-        share(
-            0,
-            "one name given, z >= 8 and isolable",
-            [r.single for r in cases],
-            lambda v, *_: v >= 0.8,
-            ">= 0.8",
-            least=100,
-        )
-    ]
+    return [share(0, "one name given, z >= 8 and isolable", [r.single for r in cases], ">= 0.8", least=100)]
 
 
 def risk_coverage(rows: Sequence[Row]) -> list[tuple[float, float, float]]:

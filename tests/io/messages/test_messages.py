@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from mcap.writer import CompressionType, IndexType, Writer
+from mcap.writer import CompressionType, IndexType
 from rosbags.interfaces import Nodetype
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
@@ -21,6 +21,7 @@ from aqualog.io.messages import batches, codecs, streams
 from aqualog.io.messages.mcap import scanned
 from aqualog.io.open_log import open_log
 from aqualog.io.reader import ReadOptions
+from tests.mcap_log import writing
 
 T0 = 1_700_000_000 * 10**9
 STEP = 10**7
@@ -112,9 +113,7 @@ def drawn(base: str, count: int | None, rng: np.random.Generator):
 
 def write_mcap(path: Path, types: Types, topics: dict[str, tuple[str, list[bytes]]], **options) -> Path:
     """Messages of all topics in turns; shorter topics end earlier."""
-    with path.open("wb") as file:
-        writer = Writer(file, **options)
-        writer.start(profile=f"ros{types.ros}")
+    with writing(path, profile=f"ros{types.ros}", **options) as writer:
         queues = []
         for topic, (kind, raw) in topics.items():
             encoding, schema_encoding, text = types.schema(kind)
@@ -124,7 +123,6 @@ def write_mcap(path: Path, types: Types, topics: dict[str, tuple[str, list[bytes
             for channel, raw in queues:
                 if i < len(raw):
                     writer.add_message(channel, T0 + i * STEP, raw[i], T0)
-        writer.finish()
     return path
 
 
@@ -307,14 +305,11 @@ def test_a_topic_on_two_connections_keeps_the_order_of_the_file(tmp_path):
     path = tmp_path / "a.mcap"
     types = wheel_types(2)
     encoding, schema_encoding, text = types.schema("car/msg/Wheels")
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
+    with writing(path) as writer:
         schema = writer.register_schema("car/msg/Wheels", schema_encoding, text)
         channels = [writer.register_channel("/wheels", encoding, schema) for _ in range(2)]
         for i, raw in enumerate(wheels(200)):
             writer.add_message(channels[i % 3 == 0], T0 + i, raw, T0)
-        writer.finish()
     compared(path)
     with open_log(path, ReadOptions()) as reader:
         found = {c.info.path: c for c in reader.read(reader.channels())}

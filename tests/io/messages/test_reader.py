@@ -5,12 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mcap.writer import CompressionType, Writer
+from mcap.writer import CompressionType
 
 from aqualog.io.messages import batches
 from aqualog.io.messages import reader as messages
 from aqualog.io.open_log import open_log
 from aqualog.io.reader import ReadOptions
+from tests.mcap_log import writing
 
 LANE = Path(__file__).parents[3] / "sample_logs" / "lane_drive.mcap"
 SCHEMA = b"std_msgs/Header header\nfloat64 x\nfloat32[3] y\n" + b"=" * 80 + (
@@ -27,9 +28,7 @@ def cdr(t_ns, x, frame="car"):
 
 
 def made(path, n=3000, *, wrong=(), unstamped=(), long_frames=(), empty_log_time=False):
-    with path.open("wb") as file:
-        writer = Writer(file, chunk_size=4000, compression=CompressionType.ZSTD)
-        writer.start()
+    with writing(path, chunk_size=4000, compression=CompressionType.ZSTD) as writer:
         schema = writer.register_schema("car/msg/State", "ros2msg", SCHEMA)
         topics = [writer.register_channel(f"/{k}", "cdr", schema) for k in "ab"]
         for i in range(n):
@@ -37,7 +36,6 @@ def made(path, n=3000, *, wrong=(), unstamped=(), long_frames=(), empty_log_time
             data = cdr(0 if i in unstamped else t, float(i), "a longer frame" if i in long_frames else "car")
             data = data[:20] if i in wrong else data
             writer.add_message(topics[i % 5 == 0], 0 if empty_log_time else t + 1000, data, t)
-        writer.finish()
     return path
 
 
