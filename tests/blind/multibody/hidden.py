@@ -323,12 +323,12 @@ _UNKNOWN = {
     "dolomite": _form(
         _by("shake", a_y=0.1), _signal("a_y", lambda e, v: e._replace(shake=(v["shake"], v["centre"], v["width"]))),
         "lateral", ("v_x",),
-        programmes=("country", "motorway", "staircase", "coast_down"), held_back=True,
-        shape=lambda rng: {"centre": rng.uniform(24.0, 29.0), "width": rng.uniform(1.5, 3.0)}),
+        programmes=("country", "staircase", "coast_down"), held_back=True,
+        shape=lambda rng: {"centre": rng.uniform(20.0, 28.0), "width": rng.uniform(1.2, 2.5)}),
     "gneiss": _form(
         _by("depth", all_=0.12), _odd("hum", "depth", "centre", "width"), "slip", ("v_x",),
         programmes=("country", "staircase"), signs=1, held_back=True,
-        shape=lambda rng: {"centre": rng.uniform(15.0, 23.0), "width": rng.uniform(2.0, 4.0)}),
+        shape=lambda rng: {"centre": rng.uniform(15.0, 23.0), "width": rng.uniform(1.5, 3.0)}),
     "basalt": _form(
         _by("force", all_=60.0), _odd("chafe", "force", "side", "threshold", "width"), "force_balance", ("a_y",),
         programmes=("city", "country"), signs=1, held_back=True, shape=lambda rng: {
