@@ -15,7 +15,7 @@ from tests.blind.multibody.car import NO_ODD, draw_car, gradients, vehicle_file
 from tests.blind.multibody.cases import DT, draw_plan, make_case, residuals
 from tests.blind.multibody.driver import ROWS, drive_along
 from tests.blind.multibody.dynamics import odd_force
-from tests.blind.multibody.hidden import HELD_BACK, KINDS, Setup, applied, draw, enlarged, in_worths, names_of
+from tests.blind.multibody.hidden import HELD_BACK, KINDS, Hidden, Setup, applied, draw, enlarged, in_worths, names_of
 from tests.blind.multibody.roads import Place, build_road
 from tests.blind.multibody.seal import LEDGER, SealError, open_truth, seal_truth
 from tests.blind.multibody.sensors import NOISES, TEETH, WHEELS, Error, coloured, edges, ideal, measure
@@ -171,14 +171,14 @@ def test_ideal_sensors_see_the_balance_of_the_vehicle_file(monkeypatch):
         assert all(abs(np.mean(r[f"slip_{w}"])) < 0.03 for w in WHEELS)
 
 
-def test_kinds_are_the_contracts_and_thirteen_forms_besides():
+def test_kinds_are_the_contracts_and_forms_besides():
     from aqualog.model.effects import EFFECTS
 
     known, unknown = [n for n, k in KINDS.items() if k.known], [n for n, k in KINDS.items() if not k.known]
     assert set(known) == set(EFFECTS)
     assert not set(unknown) & set(EFFECTS)
     assert len(unknown) >= 10
-    assert len(HELD_BACK) == 5
+    assert len(HELD_BACK) == 6
     assert not set(HELD_BACK) & set(names_of(known=False))
     for name in known:
         for h in (draw(name, np.random.default_rng(s)) for s in range(6)):
@@ -202,19 +202,24 @@ def test_every_kind_changes_its_drive(name):
     h = draw(name, np.random.default_rng(7))
     late = {k: 4.0 for k in h.values if k == "start"}
     h = replace(h, values={**h.values, **late})
+    off = replace(h, values={**h.values, **dict.fromkeys(KINDS[name].worth[h.where], KINDS[name].neutral)})
     seconds, programme = (60.0, "city") if name == "lingering_brake" else (12.0, KINDS[name].programmes[0])
     seen = clean_messages(programme, seconds, h), clean_messages(programme, seconds)
+    none = clean_messages(programme, seconds, off)
+    assert all(
+        np.array_equal(a.columns[s], b.columns[s]) for a, b in zip(none, seen[1], strict=True) for s in a.columns
+    )
     difference = max(np.abs(a.columns[s] - b.columns[s]).max() for a, b in zip(*seen, strict=True) for s in a.columns)
     assert np.isfinite(difference)
     assert difference > 1e-6
 
 
 def test_odd_forces_are_where_they_say():
-    def force(name, t=10.0, share=0.5, v=20.0, way=0.0, steer=0.0, torque=300.0, **values):
+    def force(name, t=10.0, share=0.5, v=20.0, way=0.0, steer=0.0, torque=300.0, a_side=0.0, **values):
         h = draw(name, np.random.default_rng(1))
         car, _ = car_of()
         setup = applied(Setup(car, NO_ODD, Place()), (replace(h, values={**h.values, **values}),))
-        return odd_force(t, share, v, way, steer, torque, setup.odd)
+        return odd_force(t, share, v, way, steer, torque, a_side, setup.odd)
 
     assert force("speed_hump", force=100.0, centre=20.0) == pytest.approx(100.0)
     assert force("passing_force", t=70.0, force=90.0, start=60.0, length=75.0) == pytest.approx(90.0)
@@ -222,6 +227,31 @@ def test_odd_forces_are_where_they_say():
     assert force("way_waves", way=50.0, force=80.0, period=200.0, phase=0.0) == pytest.approx(80.0)
     assert force("steering_drag", steer=-0.1, force=5000.0) == pytest.approx(500.0)
     assert force("odd_hours", share=0.05, force=50.0) == pytest.approx(-50.0, rel=0.1)
+    given = {"force": 90.0, "side": -1.0, "threshold": 0.8, "width": 0.1}
+    at = [force("basalt", a_side=a, **given) for a in (-2.0, -0.8, 0.0, 2.0)]
+    assert at == pytest.approx([90.0, 45.0, 0.0, 0.0], abs=1e-3)
+
+
+def test_odd_tyres_and_sensors_are_where_they_say():
+    car = car_of()[0]
+    band = Hidden("gneiss", None, {"depth": 0.4, "centre": 20.0, "width": 2.0})
+    driven = [w for i, w in enumerate(WHEELS) if (car.split_rear if i > 1 else 1.0 - car.split_rear) > 0.0]
+    slope = []
+    for odd in (applied(Setup(car, NO_ODD, Place()), (band,)).odd, NO_ODD):
+        x = ride(car, np.linspace(10.0, 32.0, 1300), odd=odd)
+        stiff = np.mean([x[f"force_{w}"] / (x[f"load_{w}"] * x[f"slip_{w}"]) for w in driven], axis=0)
+        slope.append([np.median(stiff[np.abs(x["v_x"] - v) < 0.3]) for v in (13.0, 18.0, 20.0, 28.0)])
+    assert np.divide(*slope) == pytest.approx([1.0, 1.0 - 0.4 * np.exp(-0.5), 0.6, 1.0], rel=0.04)
+
+    def seen(*hidden):
+        return {s: x for m in clean_messages("country", 20.0, *hidden) for s, x in m.columns.items()}
+
+    true = seen()
+    assert np.ptp(true["v_x"]) > 5.0
+    added = seen(Hidden("feldspar", "a_x", {"square": 0.03}))["a_x"] - true["a_x"]
+    assert added == pytest.approx(0.03 * true["a_x"] ** 2, abs=1e-9)
+    added = seen(Hidden("dolomite", "a_y", {"shake": 0.3, "centre": 18.0, "width": 2.0}))["a_y"] - true["a_y"]
+    assert added == pytest.approx(0.3 / (1.0 + (0.5 * (true["v_x"] - 18.0)) ** 2), abs=1e-3)
 
 
 def test_a_case_is_a_function_of_seed_and_number():

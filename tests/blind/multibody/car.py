@@ -107,6 +107,8 @@ class Odd(NamedTuple):
     turning: np.ndarray = np.array([0.0])  # s/rad, share of the slope lost per yaw rate
     ripple: np.ndarray = np.array([0.0, 0.0, 1.0])  # N m, wheel, times a turn
     linger: np.ndarray = np.array([0.0, 20.0])  # N m, s
+    chafe: np.ndarray = np.array([0.0, 1.0, 0.9, 0.2])  # N, side of the bend, m/s^2, m/s^2
+    hum: np.ndarray = np.array([0.0, 20.0, 2.0])  # share of the slope, m/s, m/s
 
 
 NO_ODD = Odd()

@@ -44,7 +44,7 @@ def _bell(x, centre, width):
 
 
 @compiled
-def odd_force(t, share, v, way, steer, torque, odd):
+def odd_force(t, share, v, way, steer, torque, a_side, odd):
     """Forces against the motion that no effect has [N]; `share` of the drive that is over, `torque` of all shafts."""
     F = 0.0
     if odd.hump[0] != 0.0:
@@ -59,6 +59,8 @@ def odd_force(t, share, v, way, steer, torque, odd):
         F += odd.hours[0] * (tanh((share - odd.hours[1]) / 0.08) - 1.6 * _bell(share, odd.hours[2], 0.09))
     if odd.valley[0] != 0.0:
         F += odd.valley[0] * _bell(v, odd.valley[1], odd.valley[2]) * _bell(torque, odd.valley[3], odd.valley[4])
+    if odd.chafe[0] != 0.0:
+        F += odd.chafe[0] * 0.5 * (1.0 + tanh((odd.chafe[1] * a_side - odd.chafe[2]) / odd.chafe[3]))
     return F * tanh(v / 0.5)
 
 
@@ -119,6 +121,8 @@ def _slope(i, t, y, aux, leak, lost, p, odd):
         slope *= 1.0 - odd.saddle[0] * _bell(abs(aux[T_SHAFT + i]), odd.saddle[1], odd.saddle[2])
     if odd.turning[0] != 0.0 and i > 1:
         slope *= 1.0 / (1.0 + odd.turning[0] * abs(y[YAW]))
+    if odd.hum[0] != 0.0:
+        slope *= 1.0 - odd.hum[0] * _bell(y[VX], odd.hum[1], odd.hum[2])
     return slope
 
 
@@ -190,7 +194,7 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
     a_side = sum_y / p.mass
     resist += p.corner_drag * p.mass * a_side * a_side
     torque = aux[T_SHAFT] + aux[T_SHAFT + 1] + aux[T_SHAFT + 2] + aux[T_SHAFT + 3]
-    resist += odd_force(t, share, v, way, steer, torque, odd)
+    resist += odd_force(t, share, v, way, steer, torque, a_side, odd)
     a_x = (sum_x - resist) / (p.mass + p.towed)
     f[VX] = a_x - G * sin(grade) + yaw * v_y
     f[VY] = a_side - G * sin(bank) - yaw * v

@@ -301,22 +301,38 @@ _UNKNOWN = {
     "odd_hours": _form(
         _by("force", all_=45.0), _odd("hours", "force", "rise", "hollow"), "force_balance", ("time",),
         shape=lambda rng: {"rise": rng.uniform(0.2, 0.35), "hollow": rng.uniform(0.6, 0.8)}),
-    # held back
+    "yawing_slip": _form(
+        _by("rate", all_=2.0), lambda s, v, _: replace(s, odd=s.odd._replace(turning=np.array([v["rate"]]))), "slip",
+        ("yaw_rate",), programmes=("country", "city"), signs=1),
+    "turn_ripple": _form(
+        {w: {"torque": 12.0} for w in WHEELS}, _ripple, "slip", ("angle",), signs=1,
+        shape=lambda rng: {"order": float(rng.integers(1, 3))}),
+    "lingering_brake": _form(
+        _by("torque", all_=16.0), _odd("linger", "torque", "time"), "force_balance", ("time since braking",),
+        programmes=("country", "city", "staircase"), signs=1, shape=lambda rng: {"time": rng.uniform(14.0, 26.0)}),
+    # held back; tables of scores show the names, so the last ones say nothing
     "torque_speed_valley": _form(
         _by("force", all_=110.0), _valley, "force_balance", ("v_x", "torque"), programmes=("country", "staircase"),
         held_back=True, shape=lambda rng: {
             "centre": rng.uniform(14.0, 23.0), "width": rng.uniform(3.0, 5.0), "acceleration": rng.uniform(0.6, 1.2)}),
-    "yawing_slip": _form(
-        _by("rate", all_=2.0), lambda s, v, _: replace(s, odd=s.odd._replace(turning=np.array([v["rate"]]))), "slip",
-        ("yaw_rate",), programmes=("country", "city"), signs=1, held_back=True),
-    "turn_ripple": _form(
-        {w: {"torque": 12.0} for w in WHEELS}, _ripple, "slip", ("angle",), signs=1, held_back=True,
-        shape=lambda rng: {"order": float(rng.integers(1, 3))}),
     "torque_read_in_speed": _form(
         _by("rate", all_=0.015), _torque_scale, "slip", ("torque",), programmes=LIVELY, held_back=True),
-    "lingering_brake": _form(
-        _by("torque", all_=16.0), _odd("linger", "torque", "time"), "force_balance", ("time since braking",),
-        programmes=("country", "city", "staircase"), signs=1, held_back=True, shape=lambda rng: {"time": rng.uniform(14.0, 26.0)}),
+    "feldspar": _form(
+        _by("square", a_x=0.006), _signal("a_x", lambda e, v: e._replace(square=v["square"])), "accelerometer", ("a_x",),
+        programmes=("city", "country", "staircase", "coast_down"), held_back=True),
+    "dolomite": _form(
+        _by("shake", a_y=0.1), _signal("a_y", lambda e, v: e._replace(shake=(v["shake"], v["centre"], v["width"]))),
+        "lateral", ("v_x",),
+        programmes=("country", "staircase", "coast_down"), held_back=True,
+        shape=lambda rng: {"centre": rng.uniform(20.0, 28.0), "width": rng.uniform(1.2, 2.5)}),
+    "gneiss": _form(
+        _by("depth", all_=0.12), _odd("hum", "depth", "centre", "width"), "slip", ("v_x",),
+        programmes=("country", "staircase"), signs=1, held_back=True,
+        shape=lambda rng: {"centre": rng.uniform(15.0, 23.0), "width": rng.uniform(1.5, 3.0)}),
+    "basalt": _form(
+        _by("force", all_=60.0), _odd("chafe", "force", "side", "threshold", "width"), "force_balance", ("a_y",),
+        programmes=("city", "country"), signs=1, held_back=True, shape=lambda rng: {
+            "side": float(rng.choice([-1, 1])), "threshold": rng.uniform(0.6, 0.9), "width": rng.uniform(0.1, 0.25)}),
 }  # fmt: skip
 
 KINDS: Mapping[str, Kind] = {**_KNOWN, **_UNKNOWN}

@@ -51,7 +51,8 @@ LEAK_SD, BIAS_SD = 1.5e-3, 8e-3  # accelerometer after its own correction: relat
 class Error(NamedTuple):
     """Hidden errors of a signal: gain (1 + by_speed (v - 15)) x + bias + drift t, late; of a wheel speed the ring as well.
 
-    `by_torque`: relative reading per square of the wheel's torque in kN m.
+    `by_torque`: relative reading per square of the wheel's torque in kN m. `square`: added per square of the signal.
+    `shake`: added at a speed [m/s], half of it so much beside that [m/s].
     """
 
     gain: float = 1.0
@@ -62,6 +63,8 @@ class Error(NamedTuple):
     by_speed: float = 0.0
     by_torque: float = 0.0
     ring: float = 0.0
+    square: float = 0.0
+    shake: tuple[float, float, float] = (0.0, 20.0, 2.0)
 
 
 class Message(NamedTuple):
@@ -126,7 +129,9 @@ def _messages(rows, car, errors, noise, rng):
             stem = symbol.split("_")[0]
             e = errors.get(symbol, Error())
             x = truth[symbol] * (slow if stem == "torque" else 1.0)
-            x = x * (1.0 + e.by_speed * (rows[:, ROWS["v_x"]] - 15.0))
+            v = rows[:, ROWS["v_x"]]
+            x = x * (1.0 + e.by_speed * (v - 15.0)) + e.square * x * x
+            x = x + e.shake[0] / (1.0 + ((v - e.shake[1]) / e.shake[2]) ** 2)
             when = t / (1.0 + e.skew * 1e-6) - e.delay + offset
             x = CubicSpline(middle, x)(np.clip(when, middle[0], middle[-1]))
             x = e.gain * x + e.bias + e.drift * t
