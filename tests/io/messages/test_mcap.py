@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import struct
 import tracemalloc
+from contextlib import contextmanager
 from pathlib import Path
 
 import lz4.frame
@@ -49,15 +50,21 @@ def read_all(path: Path) -> tuple[dict[str, Channel], McapReader]:
     return {c.info.path: c for c in reader.read(reader.channels())}, reader
 
 
-def write_json(path: Path, messages: list[dict], topic: str = "/car", schema: dict | None = SCHEMA, **options) -> Path:
+@contextmanager
+def written(path: Path, profile: str = "", **options):
     with path.open("wb") as file:
         writer = Writer(file, **options)
-        writer.start()
+        writer.start(profile=profile)
+        yield writer
+        writer.finish()
+
+
+def write_json(path: Path, messages: list[dict], topic: str = "/car", schema: dict | None = SCHEMA, **options) -> Path:
+    with written(path, **options) as writer:
         schema_id = writer.register_schema("Car", "jsonschema", json.dumps(schema).encode()) if schema else 0
         channel = writer.register_channel(topic, "json", schema_id)
         for i, message in enumerate(messages):
             writer.add_message(channel, T0 + i * 10**7, json.dumps(message).encode(), T0)
-        writer.finish()
     return path
 
 
@@ -124,13 +131,10 @@ def test_null_missing_and_text_are_nan_and_order_is_the_files(tmp_path):
 def test_out_of_order_messages_stay_in_file_order(tmp_path):
     path = tmp_path / "a.mcap"
     times = [50, 10, 30, 10]
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
+    with written(path) as writer:
         channel = writer.register_channel("/w", "json", 0)
         for t in times:
             writer.add_message(channel, t, json.dumps({"value": t}).encode(), t)
-        writer.finish()
     channels, _ = read_all(path)
     assert channels["/w.value"].info.name == "w"
     assert channels["/w.value"].t_ns.tolist() == times
@@ -182,9 +186,7 @@ def wheel_type():
 def test_protobuf(tmp_path, wheel_type):
     wheel, files = wheel_type
     path = tmp_path / "p.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
+    with written(path) as writer:
         schema = writer.register_schema("car.Wheel", "protobuf", files)
         channel = writer.register_channel("/wheel", "protobuf", schema)
         for i in range(4):
@@ -193,7 +195,6 @@ def test_protobuf(tmp_path, wheel_type):
             if i != 1:
                 message.inner.x = i + 0.5
             writer.add_message(channel, T0 + 10**9, message.SerializeToString(), T0)
-        writer.finish()
     channels, _ = read_all(path)
     assert set(channels) == {f"/wheel.{f}" for f in ("omega", "inner.x", "raw[0]", "raw[1]", "inners[0].x")}
     np.testing.assert_array_equal(channels["/wheel.omega"].values, np.arange(4) / 3)
@@ -225,9 +226,7 @@ def imu_message(store, ros1: bool, i: int, stamp_ns: int):
 def test_ros_messages(tmp_path, ros):
     store = get_typestore(Stores.ROS1_NOETIC if ros == 1 else Stores.ROS2_HUMBLE)
     path = tmp_path / "r.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start(profile=f"ros{ros}")
+    with written(path, profile=f"ros{ros}") as writer:
         encoding = {1: ("ros1", "ros1msg", "sensor_msgs/Imu"), 2: ("cdr", "ros2msg", "sensor_msgs/msg/Imu")}[ros]
         text = store.generate_msgdef("sensor_msgs/msg/Imu", ros_version=ros)[0].encode()
         channel = writer.register_channel(
@@ -237,7 +236,6 @@ def test_ros_messages(tmp_path, ros):
             message = imu_message(store, ros == 1, i, T0 + i * 10**7)
             raw = (store.serialize_ros1 if ros == 1 else store.serialize_cdr)(message, "sensor_msgs/msg/Imu")
             writer.add_message(channel, T0 + i * 10**7 + 1234, bytes(raw), T0)
-        writer.finish()
     channels, reader = read_all(path)
     assert len(channels) == 10 + 27
     a_x = channels["/imu/data.linear_acceleration.x"]
@@ -254,15 +252,12 @@ def test_idl_definition_and_missing_log_time(tmp_path):
         "=" * 80 + "\nIDL: car/msg/Wheel\nmodule car { module msg { struct Wheel {\n"
         "  builtin_interfaces::msg::Time stamp;\n  double omega;\n}; }; };\n"
     )
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start(profile="ros2")
+    with written(path, profile="ros2") as writer:
         channel = writer.register_channel(
             "/w", "cdr", writer.register_schema("car/msg/Wheel", "ros2idl", text.encode())
         )
         for i in range(3):
             writer.add_message(channel, 0, b"\0\1\0\0" + struct.pack("<iId", 1_700_000_000, i, i / 3), 0)
-        writer.finish()
     channels, _ = read_all(path)
     assert list(channels) == ["/w.omega"]
     assert channels["/w.omega"].values.tolist() == [0, 1 / 3, 2 / 3]
@@ -271,9 +266,7 @@ def test_idl_definition_and_missing_log_time(tmp_path):
 
 def test_unknown_topics_are_left_out_with_a_note(tmp_path):
     path = tmp_path / "u.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
+    with written(path) as writer:
         good = writer.register_channel("/good", "json", 0)
         flat = writer.register_channel("/flat", "flatbuffer", writer.register_schema("F", "flatbuffer", b"x"))
         odd = writer.register_channel("/odd", "cdr", writer.register_schema("a/msg/B", "ros2msg", b"foo/Missing x"))
@@ -281,7 +274,6 @@ def test_unknown_topics_are_left_out_with_a_note(tmp_path):
         for i in range(3):
             for channel, data in ((good, b'{"data": 1}'), (flat, b"xx"), (odd, b"\0\1\0\0"), (broken, b"{")):
                 writer.add_message(channel, i, data, i)
-        writer.finish()
     channels, reader = read_all(path)
     assert list(channels) == ["/good.data"]
     notes = " ".join(reader.faults.notes)
@@ -290,13 +282,10 @@ def test_unknown_topics_are_left_out_with_a_note(tmp_path):
 
 def test_message_that_cannot_be_decoded_is_counted(tmp_path):
     path = tmp_path / "a.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file)
-        writer.start()
+    with written(path) as writer:
         channel = writer.register_channel("/a", "json", 0)
         for i, data in enumerate([b'{"x": 1}', b'{"x": ', b"[" * 100_000, b'{"x": 4}']):
             writer.add_message(channel, i, data, i)
-        writer.finish()
     channels, reader = read_all(path)
     assert channels["/a.x"].values.tolist() == [1, 4]
     assert channels["/a.x"].t_ns.tolist() == [0, 3]
@@ -494,15 +483,12 @@ def test_a_record_that_tells_of_more_than_there_is_costs_no_memory(tmp_path, mon
 @pytest.mark.parametrize("grown", [0, 5, 3000, 1 << 40])
 def test_an_attachment_that_lies_about_its_size_costs_nothing_else(tmp_path, grown):
     path = tmp_path / "a.mcap"
-    with path.open("wb") as file:
-        writer = Writer(file, chunk_size=4000, use_statistics=False)
-        writer.start()
+    with written(path, chunk_size=4000, use_statistics=False) as writer:
         channel = writer.register_channel("/car", "json", writer.register_schema("Car", "jsonschema", b"{}"))
         for i in range(500):
             if i == 100:
                 writer.add_attachment(T0, T0, "video.bin", "application/octet-stream", bytes(500))
             writer.add_message(channel, T0 + i * 10**7, b'{"v": %d}' % i, T0)
-        writer.finish()
     raw = bytearray(path.read_bytes())
     start = raw.index(b"video.bin") - 9 - 8 - 8 - 4
     assert raw[start] == Opcode.ATTACHMENT
