@@ -19,27 +19,17 @@ __all__ = [
 A_BRAKING = -2.0  # [m/s^2] neither rolling, air nor water resistance decelerates a car more than that
 BRAKE_PRESSURE = 3e5  # [Pa] above the offset and residual pressure of a released brake
 TRACTION = -0.10  # [-] wheel torque over radius and load; lifting off stays above: it is what a driver does on water
+ONE_SIDED, RELEASED = -0.05, -0.02  # [-] of one wheel of an axle and of the other one where stability control brakes
 HOLD = 0.3  # [s] brakes and wheels need this long to settle after release
 
 
 def is_braking(
     a_kin: FloatArray, brake_pressure: FloatArray | None, torque_coefficient: FloatArray | None
 ) -> BoolArray:
-    """Flag samples with a negative force.
+    """Flag samples with a negative force: by brake pressure if the log has it, else by deceleration and torque. (n,)
 
-    Parameters
-    ----------
-    a_kin : array (n,)
-        Kinematic acceleration, low-passed. [m/s²]
-    brake_pressure : array (n,), optional
-        [Pa]
-    torque_coefficient : array (n,), optional
-        Net wheel torque over radius and load. [-]
-
-    Returns
-    -------
-    bool array (n,)
-        By brake pressure if the log has it; else by deceleration and torque. NaN compares as not braking.
+    `a_kin` is the kinematic acceleration, low-passed [m/s²], `brake_pressure` [Pa], `torque_coefficient` the net wheel
+    torque over radius and load [-]. NaN compares as not braking.
 
     Thesis: "without negative tyre forces" of criteria 1 and 2 in section 2.5 (C65, C66).
     """
@@ -115,18 +105,9 @@ def _began_free(was_active, free, active, braking):  # type: ignore[no-untyped-d
 
 
 def began_free(active: BoolArray, braking: BoolArray, state: tuple[bool, bool]) -> tuple[BoolArray, tuple[bool, bool]]:
-    """Keep detections that began without a braking force; braking after that does not undo them.
+    """Keep detections (n,) that began without a braking force; braking after that does not undo them.
 
-    Parameters
-    ----------
-    active, braking : bool array (n,)
-    state : (active before, began free)
-        (False, False), or the return value of the call before.
-
-    Returns
-    -------
-    y : bool array (n,)
-    state : (bool, bool)
+    `state` is active before and began free: (False, False), or the return value of the call before.
     """
     y, was_active, free = _began_free(*state, active, braking)
     return y, (bool(was_active), bool(free))
@@ -143,10 +124,23 @@ class BrakeWatch:
     def push(self, f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
         """Return bits (n,) by wheel; `columns` holds the torques that the drive has."""
         weight = 0.25 * self._vehicle.mass * G
+        known = [w for w in WHEELS if f"torque_{w}" in columns]
+        shares = {w: columns[f"torque_{w}"] / (self._vehicle.arm(w) * weight) for w in known}
+        alone = _one_sided(shares) if len(shares) == len(WHEELS) else None
         result = {}
         for wheel in WHEELS:
-            torque = columns.get(f"torque_{wheel}")
-            share = None if torque is None else torque / (self._vehicle.arm(wheel) * weight)
-            bits = is_braking(f["a_kin_slow"], f.get("brake_pressure"), share)
+            bits = is_braking(f["a_kin_slow"], f.get("brake_pressure"), shares.get(wheel))
+            if alone is not None:
+                bits = bits & ~(alone & (shares[wheel] > RELEASED))
             result[wheel], self._left[wheel] = hold_on(bits, self._left[wheel], seconds=HOLD, dt=self._dt)
         return result
+
+
+def _one_sided(shares: Mapping[str, FloatArray]) -> BoolArray:
+    """Where one wheel of an axle is braked and the other one is not (n,).
+
+    A driver brakes both: this is stability control, whose own pressure a log may have, and torques that know brakes.
+    """
+    axles = ((shares[f"{axle}l"], shares[f"{axle}r"]) for axle in "fr")
+    found = [(np.minimum(*pair) < ONE_SIDED) & (np.maximum(*pair) > RELEASED) for pair in axles]
+    return np.asarray(found[0] | found[1])

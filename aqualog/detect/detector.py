@@ -121,6 +121,12 @@ class Scene:
         return any_wheel(self.braking)
 
     @property
+    def one_side_braked(self) -> BoolArray:
+        """Return whether a braking force acts on one wheel of an axle alone, as no driver brakes. (n,)"""
+        b = self.braking
+        return (b["fl"] ^ b["fr"]) | (b["rl"] ^ b["rr"])
+
+    @property
     def unbraked_resistance(self) -> FloatArray:
         """Return the resistance measure less its dry offset; braking is no evidence of water. (n,) [m/s²]"""
         return np.where(self.is_braking, np.nan, self.f["delta_a_x"] - self.f.get("delta_a_x_offset", 0.0))

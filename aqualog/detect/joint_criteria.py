@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.core.notation import WHEELS
+from aqualog.core.notation import SIDES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, other_surface
@@ -17,6 +17,7 @@ from aqualog.detect.braking import began_free, hold_on, lasting
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.detector import Detector, Needs, Output, Scene, Setup, missing_wheels, traction
 from aqualog.detect.events import AFTER
+from aqualog.detect.margin.watch import MARGIN, PROBABLE
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import LEVEL, MEASURE, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
@@ -25,17 +26,20 @@ from aqualog.physics.load import G
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
-    "CRITERIA", "FULL", "GATE", "GATED", "GATE_AFTER", "GATE_HOLD", "HOLD", "JOINT_CRITERIA", "MAY_BE_WATER", "ROTATES",
-    "SLOPE", "Criteria", "JointCriteriaWatch", "criteria", "gate_params", "joint_needs", "joint_severity",
+    "ALONE", "CRITERIA", "FULL", "GATE", "GATED", "GATE_AFTER", "GATE_HOLD", "HOLD", "JOINT_CRITERIA", "MAY_BE_WATER",
+    "ROTATES", "SLOPE", "Criteria", "JointCriteriaWatch", "criteria", "gate_params", "joint_needs", "joint_severity",
     "without_start",
 ]  # fmt: skip
 
 THRESHOLD = 0.03  # [m/s]
 GATE_HOLD = 1.0  # [s] the resistance gate stays open this long
 HOLD = 0.5  # [s] a warning outlasts its criteria by this
+ALONE = 0.7  # of a wheel's variance that the other axle must not have: gravel shakes both (C33)
 SLIP_STOPPED = -0.10  # [-] a braked wheel this far behind slides on any road
 A_STOPPED = -3.0  # [m/s^2] the water takes the brakes' force from the car too
 V_STOPPED = 17.0  # [m/s] slower, no film of road water carries a wheel: `other_surface`
+BEGIN = 3.0  # [s] of a log in which no minor spin-down begins, and an offset may have been learnt in water
+CONTACT_PARTIAL = 0.7  # [-] thesis 2.2
 _NUMBERED = {1: SPIN_DOWN, 2: MINOR_SPIN_DOWN, 3: SPIN_UP, 4: SLIP_SLOPE_DROP, 5: RESISTANCE}
 CRITERIA = {d.name: number for number, d in _NUMBERED.items()}
 SLOPE = 4
@@ -68,17 +72,10 @@ def criteria(
     mu: Mapping[str, FloatArray | None],
     v_x: FloatArray,
 ) -> Criteria:
-    """Evaluate criteria 1 to 5 from the tracks of the single detectors.
+    """Evaluate criteria 1 to 5 from the tracks of the single detectors, of a piece of the drive. (n,)
 
-    Parameters
-    ----------
-    tracks : sequence of (Track, bool array (n,))
-        Of this piece of the drive. Tracks of wheels come with the detections that began without a braking force;
-        tracks of other detectors are ignored.
-    v_w, mu : mapping wheel -> array (n,)
-        Centre-line wheel speed [m/s]; traction coefficient, None if not known [-].
-    v_x : array (n,)
-        Velocity. [m/s]
+    Tracks of wheels come with the detections that began without a braking force; tracks of other detectors are
+    ignored. `v_w` centre-line wheel speeds and `v_x` [m/s]; `mu` traction coefficients, None if not known [-].
 
     Thesis: section 2.5 (C65-C69). 1 to 3 do not count under a negative tyre force; a detection that began without it
     stays when the driver brakes after it. 4: slope below half of the dry one, tyre driven, wheel acceleration calm.
@@ -125,7 +122,7 @@ class JointCriteriaWatch:
         self._other = other_surface.OtherParams.make(setup.dt)
         self._surface = other_surface.initial_state()
         self._free: dict[tuple[str, str], tuple[bool, bool]] = {}
-        self._open = self._hold = self._recent = self._round = 0
+        self._open = self._hold = self._recent = self._round = self._rows = 0
         self._stopped = dict.fromkeys(WHEELS, 0)
 
     def push(self, scene: Scene) -> Output:
@@ -145,18 +142,21 @@ class JointCriteriaWatch:
         )
         bits, stopped = found.behind(gate, slope), self._stopped_by_water(scene)
         bits[1] |= stopped
-        recent, self._recent = hold_on(stopped, self._recent, seconds=HOLD, dt=self._dt)
-        count = np.sum([bits[k] for k in GATED], axis=0, dtype=np.float64)
-        warned: BoolArray = np.asarray((count > 0) & (stopped | ~np.isnan(x)))
+        early = self._begins_in_water(scene)
+        sure = stopped | early
+        recent, self._recent = hold_on(sure, self._recent, seconds=HOLD, dt=self._dt)
+        count = np.sum([early, *(bits[k] for k in GATED)], axis=0, dtype=np.float64)
+        warned: BoolArray = np.asarray((count > 0) & (sure | ~np.isnan(x)))
         active, self._hold = hold_on(warned, self._hold, seconds=HOLD, dt=self._dt)
         name = self._setup.detector.name
-        track = Track(name, None, None, "-", np.where(np.isnan(x) & ~stopped, np.nan, count), 1.0, active)
+        track = Track(name, None, None, "-", np.where(np.isnan(x) & ~sure, np.nan, count), 1.0, active)
         evidence: dict[str, Any] = {
             "v_x": ("first", f["v_x_hat"]),
             "slip_min": ("min", found.slip_min),
             "delta_a_x_max": ("max", scene.unbraked_resistance),
             **{f"criterion_{k}": ("any", b) for k, b in bits.items()},
             **{f"at_start_{k}": ("at_start", b) for k, b in bits.items()},
+            f"at_start_{MARGIN.name}": ("at_start", early),
             "full": ("any", found.is_full | stopped),
             AFTER: ("last", np.where(recent, np.minimum(after, HOLD), after)),
         }
@@ -190,6 +190,23 @@ class JointCriteriaWatch:
             bits, self._stopped[w] = lasting(slows, self._stopped[w], least=least, stays=slides)
             stopped |= bits
         return stopped
+
+    def _begins_in_water(self, scene: Scene) -> BoolArray:
+        """Where a log begins on water, and the front axle has probably lost three tenths of its contact (n,).
+
+        What this car shows on dry road is not known yet: only slips, shake and resistance together show water. Gravel
+        shakes both axles.
+        """
+        f, none, first = scene.f, np.full(scene.size, np.nan), self._rows
+        self._rows += scene.size
+        with np.errstate(invalid="ignore"):
+            lost = f.get("contact_expected", none) < CONTACT_PARTIAL
+            lost &= (f.get("water_probability", none) > PROBABLE) & (f["v_x_hat"] > V_STOPPED)
+            alone = np.zeros(scene.size, dtype=bool)
+            for pair in SIDES.values():
+                front, rear = (f.get(f"variance_{w}", none) for w in pair)
+                alone |= np.minimum(front, rear) < (1.0 - ALONE) * np.maximum(front, rear)
+        return np.asarray(lost & alone & (np.arange(first, self._rows) * self._dt < BEGIN) & ~scene.is_braking)
 
     def _began_free(self, track: Track, scene: Scene, rotates: BoolArray) -> BoolArray:
         if track.detector not in _OF_WHEELS or track.wheel is None:
@@ -225,7 +242,8 @@ def without_start(evidence: Mapping[str, Any]) -> dict[str, Any]:
 
 def _explain(evidence: dict[str, Any]) -> dict[str, Any]:
     """Add `decided_by`: the criteria that were met when the warning began."""
-    met = [d.name for k, d in _NUMBERED.items() if evidence.get(f"at_start_{k}")]
+    numbered: Mapping[Any, Detector] = {**_NUMBERED, MARGIN.name: MARGIN}
+    met = [d.name for k, d in numbered.items() if evidence.get(f"at_start_{k}")]
     return {**without_start(evidence), "decided_by": met}
 
 
@@ -239,7 +257,7 @@ JOINT_CRITERIA = Detector(
     needs=joint_needs,
     start=JointCriteriaWatch,
     kind="joint",
-    reads=tuple(_NUMBERED.values()),
+    reads=(*_NUMBERED.values(), MARGIN),
     severity=joint_severity,
     explain=_explain,
 )

@@ -13,6 +13,7 @@ from aqualog.detect.braking import hold_on
 from aqualog.detect.detector import Detector, JointCusumParams, Output, Scene, Setup
 from aqualog.detect.events import AFTER
 from aqualog.detect.joint_criteria import (
+    ALONE,
     FULL,
     GATE,
     GATE_AFTER,
@@ -32,7 +33,6 @@ from aqualog.detect.spin import SPIN_DOWN, SPIN_UP, has_lost_traction, spins_rou
 __all__ = ["JOINT_CUSUM", "TERMS", "JointCusumParams", "JointCusumWatch", "terms"]
 
 TERMS = tuple(d.name for d in (SPIN_UP, SPIN_DOWN, RESISTANCE, MINOR_SPIN_DOWN, SLIP_SLOPE_DROP))
-ALONE = 0.7  # of a wheel's variance that the other axle must not have: gravel shakes both (C33)
 LEAST_TERM = 0.1  # [-] a term below that has decided nothing
 
 

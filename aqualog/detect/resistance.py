@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from aqualog.calibrate import online
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum
@@ -33,6 +34,7 @@ FREEZE = 2.0  # [s] after a wheel has left the road's speed nothing is learnt as
 V_MIN = 14.0  # [m/s] below 50 km/h even 2 mm of water cost less than 0.12 m/s^2; traffic rules the balance
 CLIP = 0.8  # [m/s^2] a gear change or a bump shows more for a moment than water ever does (C46)
 V_OFFSET = 5.0  # [m/s] from here on the dry offset is learnt; the less water shows, the better
+BRAKE_UNSURE = 0.2  # [-] of a brake's torque that no log knows
 A_OFFSET = 1.0  # [m/s^2] beyond, a wrong mass shows in the measure, and curves cost more than the model knows
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
 
@@ -50,23 +52,10 @@ def trusted_measure(delta_a_x: FloatArray, v_x: FloatArray, a_y: FloatArray, is_
     """Return the resistance measure where the longitudinal balance can be trusted.
 
     Elsewhere it is zero: no evidence, and sums decay. Under braking it is the least value, so that an alarm ends within
-    a quarter of a second.
+    a quarter of a second: brake torque is rarely known well enough.
 
-    Parameters
-    ----------
-    delta_a_x : array (n,)
-        Nominal minus measured acceleration (thesis 2.9); more resistance is positive. [m/s²]
-    v_x : array (n,)
-        Velocity. [m/s]
-    a_y : array (n,)
-        Lateral acceleration, low-passed. [m/s²]
-    is_braking : bool array (n,)
-        A braking force acts on any wheel: brake torque is rarely known well enough.
-
-    Returns
-    -------
-    x : array (n,)
-        Within ±0.8; NaN stays NaN. [m/s²]
+    `delta_a_x` is the nominal less the measured acceleration (thesis 2.9) [m/s²], more resistance positive; `v_x`
+    [m/s]; `a_y` lateral acceleration, low-passed [m/s²]. The result is within ±0.8; NaN stays NaN. [m/s²]
     """
     with np.errstate(invalid="ignore"):
         trusted = (v_x > V_MIN) & (np.abs(a_y) < A_Y_MAX)
@@ -79,16 +68,8 @@ def usable_for_offset(
 ) -> FloatArray:
     """Return the resistance measure where it shows its own offset on dry road: rolling steadily, straight, no brake.
 
-    Parameters
-    ----------
-    delta_a_x, v_x, a_kin, a_y : array (n,)
-        As in `trusted_measure`; `a_kin` kinematic acceleration, low-passed. [m/s², m/s]
-    is_braking : bool array (n,)
-
-    Returns
-    -------
-    x : array (n,)
-        Within ±0.8; NaN elsewhere. [m/s²]
+    Arrays (n,) as in `trusted_measure`; `a_kin` is the kinematic acceleration, low-passed [m/s²]. The measure is within
+    ±0.8, NaN elsewhere. [m/s²]
     """
     with np.errstate(invalid="ignore"):
         usable = (v_x > V_OFFSET) & (np.abs(a_kin) < A_OFFSET) & (np.abs(a_y) < A_OFFSET) & ~is_braking
@@ -123,7 +104,10 @@ class ResistanceWatch:
             offset, self._offset = online.scan(self._online, self._offset, usable, f["v_x_hat"], frozen)
             features["delta_a_x_offset"] = offset
             measure = measure - offset
-        x = trusted_measure(measure, f["v_x_hat"], f["a_y_slow"], scene.is_braking)
+        # the torques show how hard stability control brakes a wheel, if not to the last tenth
+        one_side = scene.one_side_braked
+        sure = np.where(one_side, measure - BRAKE_UNSURE * self._braked(scene), measure)
+        x = trusted_measure(sure, f["v_x_hat"], f["a_y_slow"], scene.is_braking & ~one_side)
         g, bits, self._sum = cusum.scan(self._params, self._sum, x)
         since, after, self._ages = cusum.ages(self._dt, self._ages, g, bits)
         evidence: dict[str, Any] = {
@@ -135,6 +119,12 @@ class ResistanceWatch:
             AFTER: ("last", after),
         }
         return Output(((self._setup.track(g, bits), evidence),), features, {MEASURE: x})
+
+    def _braked(self, scene: Scene) -> FloatArray:
+        """Return the deceleration that negative torques make. (n,) [m/s²]"""
+        vehicle, none = self._setup.vehicle, np.zeros(scene.size)
+        forces = [np.minimum(scene.columns.get(f"torque_{w}", none), 0.0) / vehicle.arm(w) for w in WHEELS]
+        return np.asarray(-np.sum(forces, axis=0) / vehicle.mass)
 
 
 def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:

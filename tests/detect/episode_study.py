@@ -4,6 +4,8 @@ python -m tests.detect.episode_study --passes 300 --first 1000
 python -m tests.detect.episode_study --dry-hours 20 --first 1000
 python -m tests.detect.episode_study --dry-hours 20 --first 1000 --others    # with snow, ice, gravel and damp roads
 python -m tests.detect.episode_study --stops 100 --first 1000                # antilock braking into water, and elsewhere
+python -m tests.detect.episode_study --controlled 60 --first 1000           # stability control in water, and on dry road
+python -m tests.detect.episode_study --begins 200 --first 1000              # logs that begin on water
 """
 
 from __future__ import annotations
@@ -11,10 +13,12 @@ from __future__ import annotations
 import argparse
 import zlib
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
 from aqualog.detect.stream import detect_drive
 from aqualog.evaluate.drives import labels_in
 from aqualog.evaluate.labels import overlaps
@@ -24,6 +28,7 @@ from aqualog.model.scenario import Lane
 from aqualog.model.simulate import simulate
 from aqualog.model.situations import SITUATIONS, believed_vehicle, draw
 from aqualog.model.situations_made import _lane, _water
+from tests.detect import stability
 
 DRY_GAP_S = (4.0, 12.0)  # between two lanes
 SPEED_KMH = (-15.0, 10.0)  # against that of full aquaplaning
@@ -116,10 +121,8 @@ def stop_scenario(road: str, seed: int, pool):
     )
 
 
-def stop(road: str, seed: int, pool):
+def judged(signals, believed, note: str):
     """Delays of the first joint warning behind full and partial aquaplaning [s] (NaN: none), and false episodes."""
-    drive, believed, note = stop_scenario(road, seed, pool)
-    signals = as_signals(simulate(drive), vehicle=believed)
     labels, found = labels_in(signals), detect_drive(signals, believed, samples=False)
     joint = [e for e in found.events if e.detector.startswith("joint")]
     begun = [spans[0][0] if (spans := labels.of(effect)) else np.nan for effect in ("full", "partial")]
@@ -129,6 +132,42 @@ def stop(road: str, seed: int, pool):
     return delays, false, signals.duration_s
 
 
+def stop(road: str, seed: int, pool):
+    """What is said of a stop, see `judged`."""
+    drive, believed, note = stop_scenario(road, seed, pool)
+    return judged(as_signals(simulate(drive), vehicle=believed), believed, note)
+
+
+def controlled(kind: str, seed: int, pool):
+    """What is said of a drive with stability control, see `judged`; None where a wheel turns backwards."""
+    road, kind, known = kind.split()
+    rng, k, depth, v_full = _drawn(f"stability {road} {kind}", seed, pool)
+    lane = (lambda k, start, length: _lane(k, start, length, depth)) if road == "water" else None
+    drive = stability.steered_drive(kind, k, v_full, lane)
+    believed = believed_vehicle(drive, rng)
+    try:
+        signals = stability.controlled(drive, believed, float(known))
+    except ConfigError:
+        return None
+    if min(signals.array(f"omega_{w}").min() for w in WHEELS) < -2.0:
+        return None
+    return judged(signals, believed, f"{kind} {seed}, {k.vehicle.name}, full at {v_full / KMH:.0f} km/h")
+
+
+def begin(_: str, seed: int, pool):
+    """What is said of a log that begins on water, or up to a second before it, see `judged`."""
+    rng, k, depth, v_full = _drawn("first second", seed, pool)
+    v = max(v_full + k.between(-25.0, 10.0) * KMH, 50.0 * KMH)
+    t, seconds = k.between(0.0, 1.0), k.between(3.0, 6.0) if v < v_full - 10.0 * KMH else k.between(2.0, 3.5)
+    lane = _lane(k, v * t, v * seconds, depth)
+    drive = k.drive(seconds + 6.0, ((0.0, v),), lanes=(lane if t > 0.3 else replace(lane, start=-5.0),))
+    believed = believed_vehicle(drive, rng)
+    return judged(as_signals(simulate(drive), vehicle=believed), believed, f"begin {seed}, {k.vehicle.name}")
+
+
+CONTROLLED = tuple(
+    f"{road} {kind} {known}" for road in ("water", "dry") for kind in ("curve", "lane_change") for known in (1.0, 0.75)
+)
 ROADS = ("water", "asphalt", "damp", "snow", "ice", "gravel", "split", "entry")
 NUISANCES = tuple(n for n, s in SITUATIONS.items() if s.kind == "nuisance")
 _OTHER_ROADS = ("damp", "snow", "ice", "gravel", "split")
@@ -154,6 +193,8 @@ def main() -> None:
     parser.add_argument("--dry-hours", type=float, default=0.0)
     parser.add_argument("--others", action="store_true")
     parser.add_argument("--stops", type=int, default=0)
+    parser.add_argument("--controlled", type=int, default=0)
+    parser.add_argument("--begins", type=int, default=0)
     parser.add_argument("--first", type=int, default=1)
     a = parser.parse_args()
     pool, seed, done = SCORING_POOL, a.first, []
@@ -172,12 +213,15 @@ def main() -> None:
               f"number right in {np.mean([x.is_counted for x in done]):.1%}; "
               f"begin within 1 s {inside[:, 0].mean():.1%}, median {np.median(edges[:, 0]):+.2f} s; "
               f"end {inside[:, 1].mean():.1%}, median {np.median(edges[:, 1]):+.2f} s")  # fmt: skip
-    for road in ROADS if a.stops else ():
-        stops = [stop(road, seed, pool) for seed in range(a.first, a.first + a.stops)]
-        full, partial = np.array([x for x, _, _ in stops]).T
-        print(f"{road}: {sum(s for *_, s in stops) / 3600.0:.2f} h, full found in 0.5 s {np.sum(full <= 0.5)} of "
-              f"{np.sum(~np.isnan(full))}, partial in 2 s {np.sum(partial <= 2.0)} of {np.sum(~np.isnan(partial))}; false: ",
-              [(note, e.start_s, e.decided_by) for _, false, _ in stops for note, e in false], flush=True)  # fmt: skip
+    kinds = (ROADS, a.stops, stop), (CONTROLLED, a.controlled, controlled), (("begin",), a.begins, begin)
+    for names, count, make in kinds:
+        for name in names if count else ():
+            found = [x for seed in range(a.first, a.first + count) if (x := make(name, seed, pool)) is not None]
+            full, partial = np.array([x for x, _, _ in found]).T
+            print(f"{name}: {len(found)} drives, {sum(s for *_, s in found) / 3600.0:.2f} h, full found in 0.5 s "
+                  f"{np.sum(full <= 0.5)} of {np.sum(~np.isnan(full))}, partial in 2 s {np.sum(partial <= 2.0)} of "
+                  f"{np.sum(~np.isnan(partial))}; false: ",
+                  [(note, e.start_s, e.decided_by) for _, false, _ in found for note, e in false], flush=True)  # fmt: skip
     if a.dry_hours:
         seconds, found, by = alarms(a.dry_hours, a.first, pool, NUISANCES if a.others else DRY)
         print(f"{seconds / 3600.0:.1f} h dry, seeds from {a.first}: {len(found)} episodes of aquaplaning; "

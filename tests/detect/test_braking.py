@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
 
-from aqualog.detect.braking import began_free, hold_on, is_braking
+from aqualog.core.notation import WHEELS
+from aqualog.detect.braking import BrakeWatch, began_free, hold_on, is_braking
+from tests.drives import CAR
 
 
 def bits(text):
@@ -36,3 +38,16 @@ def test_brake_pressure_decides_where_there_is_one():
 
 def test_hold():
     assert hold_on(bits("0100000"), 0, seconds=0.02, dt=0.01)[0].tolist() == bits("0110000").tolist()
+
+
+@pytest.mark.parametrize(("torque", "known", "expected"), [
+    ({"fl": -400.0}, WHEELS, ["fl"]),  # stability control
+    ({"fl": -400.0, "fr": -40.0, "rl": -150.0, "rr": -30.0}, WHEELS, [*WHEELS]),  # a driver with antilock brakes
+    ({"rl": -400.0}, ("rl", "rr"), [*WHEELS]),  # torques of the driven axle do not know the brakes
+])  # fmt: skip
+def test_a_pressure_brakes_the_wheels_that_torques_say(torque, known, expected):
+    f = {"a_kin_slow": np.full(3, -1.0), "brake_pressure": np.full(3, 1e6)}
+    columns = {f"torque_{w}": np.full(3, torque.get(w, 0.0)) for w in known}
+    braking = BrakeWatch(CAR, 0.01).push(f, columns)
+    assert [w for w in WHEELS if braking[w].all()] == expected
+    assert not any(braking[w].any() for w in WHEELS if w not in expected)

@@ -14,8 +14,13 @@ from aqualog.detect.events import EventBook
 from aqualog.detect.joint_criteria import GATE, GATE_AFTER, JOINT_CRITERIA, MAY_BE_WATER, ROTATES
 from aqualog.detect.joint_cusum import JOINT_CUSUM, TERMS
 from aqualog.detect.resistance import MEASURE
+from aqualog.detect.stream import detect_drive
+from aqualog.detect.verdict import JOINT
+from aqualog.model import situations
+from aqualog.model.log import as_signals
+from aqualog.model.simulate import simulate
 from tests.detect import episode_study
-from tests.drives import CAR
+from tests.drives import CAR, drive, lane
 
 DT = 0.01
 N = 200
@@ -213,19 +218,37 @@ def test_water_stops_a_braked_wheel_and_ice_turns_it_up_again(road, limit):
         assert not false
 
 
+@pytest.mark.parametrize(("seed", "kind"), [(7013, "curve 1.0"), (7038, "curve 0.75"), (7007, "lane_change 1.0")])
+def test_water_is_found_while_stability_control_brakes_single_wheels(seed, kind):
+    (_, partial), _, _ = episode_study.controlled(f"water {kind}", seed, episode_study.SCORING_POOL)
+    assert partial <= 2.0
+    assert episode_study.controlled(f"dry {kind}", seed, episode_study.SCORING_POOL)[1] == []
+
+
+def test_a_log_that_begins_on_water():
+    """Its offset is learnt in water, and no minor spin-down begins in the first three seconds."""
+    found = detect_drive(drive(duration_s=7.0, lanes=(lane(0.0, 5.0),), speed_kmh=((0.0, 92.0),), seed=2)[0], CAR)
+    first = next(e for e in found.events if e.detector == "joint_criteria")
+    assert first.start_s < 2.0
+    assert first.evidence["decided_by"] == ["margin"]
+
+
+def test_a_log_that_begins_on_gravel():
+    """Slip, resistance and shake are those of water, but both axles shake."""
+    drawn = situations.draw("gravel", 7002, episode_study.SCORING_POOL)
+    signals = as_signals(simulate(replace(drawn.scenario, duration_s=4.0)), vehicle=drawn.believed)
+    found = detect_drive(signals, drawn.believed)
+    assert found.features["water_probability"].max() > 0.5
+    assert not [e for e in found.events if e.detector in JOINT]
+
+
 def turning(joint, seen, yaw_rate, a_y=0.0):
     """Where a joint detector warns (n,), the second one with what the first one says of the car's rotation."""
-    f = {
-        "yaw_rate_slow": yaw_rate,
-        "a_y_slow": a_y,
-        "a_kin_slow": 0.0,
-        "mu_fr": 0.2,
-    }  # a spin-up would need less to begin
+    # a spin-up would need less traction to begin
+    f = {"yaw_rate_slow": yaw_rate, "a_y_slow": a_y, "a_kin_slow": 0.0, "mu_fr": 0.2}
     seen = replace(seen, f=seen.f | {n: np.broadcast_to(x, (N,)) for n, x in f.items()})
-    rotates = (
-        JOINT_CRITERIA.start(Setup(JOINT_CRITERIA, CAR, DT, JOINT_CRITERIA.threshold, Settings())).push(seen).shared
-    )
-    return watched(joint, replace(seen, shared=seen.shared | {ROTATES: rotates[ROTATES]}))[0].active
+    first = JOINT_CRITERIA.start(Setup(JOINT_CRITERIA, CAR, DT, JOINT_CRITERIA.threshold, Settings()))
+    return watched(joint, replace(seen, shared=seen.shared | {ROTATES: first.push(seen).shared[ROTATES]}))[0].active
 
 
 @pytest.mark.parametrize("joint", [JOINT_CRITERIA, JOINT_CUSUM])

@@ -20,6 +20,10 @@ class Table:
     columns: tuple[Field, ...]
 
 
+def _ends(low: str, high: str, unit: str, least: str, greatest: str = "upper end") -> tuple[Field, Field]:
+    return number(low, unit, least), number(high, unit, greatest)
+
+
 _RUNS = Table(
     "runs.parquet",
     "`aqualog batch` into the store",
@@ -37,8 +41,7 @@ _RUNS = Table(
         count("start_ns", "absolute time of the first sample since 1970", "ns"),
         number("duration_s", "s", "length"),
         number("distance_m", "m", "way"),
-        number("v_min_kmh", "km/h", "least speed"),
-        number("v_max_kmh", "km/h", "greatest speed"),
+        *_ends("v_min_kmh", "v_max_kmh", "km/h", "least speed", "greatest speed"),
         number("sample_rate_hz", "Hz", "rate of the common time grid"),
         text("slip_against", "what the slip is measured against"),
         text("traction", "source of the traction"),
@@ -67,8 +70,7 @@ _EVENTS = Table(
         text("detector", "detector"),
         text("wheel", "wheel; null where it does not apply"),
         text("side", "side; null where it does not apply"),
-        number("start_s", "s", "begin, from the log's first sample"),
-        number("end_s", "s", "end"),
+        *_ends("start_s", "end_s", "s", "begin, from the log's first sample", "end"),
         text("severity", "partial or full"),
         number("peak", "unit of the statistic", "greatest value of the statistic"),
         number("threshold", "unit of the statistic", "its threshold"),
@@ -86,8 +88,7 @@ _EPISODES = Table(
         text("name", "log"),
         text("key", "name of its files in the store"),
         text("kind", "aquaplaning, suspected, other_surface, wheel_lock or single_detector"),
-        number("start_s", "s", "estimate of the begin, from the log's first sample"),
-        number("end_s", "s", "estimate of the end"),
+        *_ends("start_s", "end_s", "s", "estimate of the begin, from the log's first sample", "estimate of the end"),
         text("wheels", "wheels that lost speed or grip, the worst first"),
         text("axle", "axle of all of these wheels; null where both"),
         text("side", "side of all of these wheels; null where both"),
@@ -111,8 +112,7 @@ _SAMPLES = Table(
         number("a_over_v", "1/s", "acceleration over speed"),
         number("delta_a_x", "m/s^2", "resistance measure (2.9), mean over the step, with no offset taken off"),
         number("on_water", "-", "label of the log"),
-        number("water_depth_left", "m", "measured depth"),
-        number("water_depth_right", "m", "measured depth"),
+        *_ends("water_depth_left", "water_depth_right", "m", "measured depth", "measured depth"),
         number("slip_WHEEL", "-", "slip (3.13)"),
         number("slip_min_WHEEL", "-", "least deviation of the wheel from the car"),
         number("slip_max_WHEEL", "-", "greatest deviation"),
@@ -120,8 +120,7 @@ _SAMPLES = Table(
         flag("spin_WHEEL", "whether a spin-down or spin-up is going on"),
         flag("minor_WHEEL", "whether a minor spin-down is going on"),
         number("v_full", "m/s", "speed of full aquaplaning that the margin expects"),
-        number("v_full_low", "m/s", "low end of its 90 % interval"),
-        number("v_full_high", "m/s", "high end of its 90 % interval"),
+        *_ends("v_full_low", "v_full_high", "m/s", "low end of its 90 % interval", "high end of its 90 % interval"),
         count("reason", "0: the sample counts for the regression; else why it does not"),
     ),
 )
@@ -142,16 +141,13 @@ _SLOPES = Table(
     "A line per place over the whole drive, and one per part of it.",
     (
         text("place", "side or axle"),
-        number("start_s", "s", "begin"),
-        number("end_s", "s", "end"),
+        *_ends("start_s", "end_s", "s", "begin", "end"),
         number("used_s", "s", "time used"),
         count("samples", "samples"),
         number("slope", "-", "slip slope C_s / F_z"),
-        number("slope_low", "-", "lower end of the 95 % interval"),
-        number("slope_high", "-", "upper end"),
+        *_ends("slope_low", "slope_high", "-", "lower end of the 95 % interval"),
         number("offset", "-", "offset of the slip"),
-        number("offset_low", "-", "lower end of the 95 % interval"),
-        number("offset_high", "-", "upper end"),
+        *_ends("offset_low", "offset_high", "-", "lower end of the 95 % interval"),
         text("reason", "why there is no slope"),
     ),
 )
@@ -169,8 +165,7 @@ _CLAIMS = Table(
         text("criterion", "what must come out"),
         text("found", "what came out"),
         number("value", "unit", "the same as a number"),
-        number("low", "unit", "lower end of the interval"),
-        number("high", "unit", "upper end"),
+        *_ends("low", "high", "unit", "lower end of the interval"),
         text("unit", "unit"),
         text("check_verdict", "verdict of the check"),
         text("reason", "why it differs"),
@@ -179,20 +174,17 @@ _CLAIMS = Table(
 )
 _PLACE = (text("KEY", "grouping keys of `--by`"), text("place", "wheel or side; of the resistance empty"))
 _BIN = (
-    number("v_low_kmh", "km/h", "lower end of the bin of speed"),
-    number("v_high_kmh", "km/h", "upper end"),
+    *_ends("v_low_kmh", "v_high_kmh", "km/h", "lower end of the bin of speed"),
     number("v_mean_kmh", "km/h", "mean speed"),
 )
 _REGRESSION = (
-    number("ci95_low", "", "lower end of the 95 % interval"),
-    number("ci95_high", "", "upper end"),
+    *_ends("ci95_low", "ci95_high", "", "lower end of the 95 % interval"),
     count("runs", "runs"),
     count("samples", "samples of 0.1 s"),
     flag("reliable", "see the document of the command"),
     number("expected", "", "what the model gives"),
     number("dry", "", "the same off the water"),
-    number("dry_ci95_low", "", "lower end of its interval"),
-    number("dry_ci95_high", "", "upper end"),
+    *_ends("dry_ci95_low", "dry_ci95_high", "", "lower end of its interval"),
     text("reason", "why there is no value"),
 )
 _REPORT = "`aqualog report -o DIR`"
@@ -216,8 +208,7 @@ _REPORT_SPEED = Table(
         *_PLACE,
         text("way", "how it was found"),
         number("v_kmh", "km/h", "speed"),
-        number("ci95_low_kmh", "km/h", "lower end of the 95 % interval"),
-        number("ci95_high_kmh", "km/h", "upper end"),
+        *_ends("ci95_low_kmh", "ci95_high_kmh", "km/h", "lower end of the 95 % interval"),
         text("rests_on", "what it rests on"),
         text("reason", "why there is no value"),
     ),

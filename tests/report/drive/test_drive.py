@@ -260,13 +260,16 @@ def y_range(browser, axis):
     return browser.execute_script("return document.getElementById('plots').layout[arguments[0]].range", axis)
 
 
+def with_peak(short):
+    track = next(t for t in short.tracks if t.detector == "minor_spin_down" and t.wheel == "fl")
+    peak = replace(track, statistic=np.where(np.arange(3000) == 1500, 5000.0, track.statistic))
+    return replace(short, tracks=(*(t for t in short.tracks if t is not track), peak))
+
+
 def test_a_peak_hides_no_limit_until_it_is_asked_for(show, short):
     from selenium.webdriver.common.by import By
 
-    track = next(t for t in short.tracks if t.detector == "minor_spin_down" and t.wheel == "fl")
-    track = replace(track, statistic=np.where(np.arange(3000) == 1500, 5000.0, track.statistic))
-    others = tuple(t for t in short.tracks if (t.detector, t.wheel) != ("minor_spin_down", "fl"))
-    browser = show(replace(short, tracks=(*others, track)))
+    browser = show(with_peak(short))
     rows = browser.execute_script("return JSON.parse(document.getElementById('drive-data').textContent).rows")
     axis = next(r["axis"] for r in rows if r["title"] == "Minor spin-down")
     assert y_range(browser, axis)[1] < 60.0  # ten times the limit of 5
@@ -286,10 +289,7 @@ def test_a_peak_hides_no_limit_until_it_is_asked_for(show, short):
 
 
 def test_on_a_narrow_screen_what_is_not_shown_covers_no_title(show, short):
-    track = next(t for t in short.tracks if t.detector == "minor_spin_down" and t.wheel == "fl")
-    track = replace(track, statistic=np.where(np.arange(3000) == 1500, 5000.0, track.statistic))
-    others = tuple(t for t in short.tracks if (t.detector, t.wheel) != ("minor_spin_down", "fl"))
-    browser = show(replace(short, tracks=(*others, track)))
+    browser = show(with_peak(short))
     covered = """
         const box = e => e.getBoundingClientRect(), titles = [...document.querySelectorAll("#plots .annotation-text")];
         const chips = [...document.querySelectorAll(".panel-bar button")].filter(b => b.textContent.startsWith("not shown"));
