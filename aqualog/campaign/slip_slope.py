@@ -12,7 +12,7 @@ import numpy as np
 from aqualog.campaign.bins import DEPTH_KEYS, NO_DRIVETRAIN, Cell, Group, Picked, Plan, Pool, cells, driven_of
 from aqualog.campaign.delay import Delay, Source, delays, source_of
 from aqualog.campaign.expected import LINEAR, Expected, contact_of, expected_of_runs, friction_of, tangent_of
-from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
+from aqualog.campaign.results import SETTLING_S, CampaignData, RunInfo, RunSamples
 from aqualog.core.intervals import NOWHERE, Interval
 from aqualog.core.moments import Design
 from aqualog.core.notation import SIDES
@@ -149,8 +149,10 @@ def slip_slopes(data: CampaignData, plan: Plan, *, robust: bool = False, limits:
             return _without_slip(info)
         if np.isnan(mu).all():
             return "no traction: no torque of the driven wheels"
+        t, spun = samples.t, samples.t[samples.bits(f"spin_{wheel}") | (np.abs(slip) > S_MAX)]
         without = {
-            "the wheel spins": samples.bits(f"spin_{wheel}") | (np.abs(slip) > S_MAX),
+            # on its way there and back it slides, and has no slope
+            "the wheel spins": np.searchsorted(spun, t + SETTLING_S) > np.searchsorted(spun, t - SETTLING_S),
             f"traction beyond {WIND_UP:g}": np.abs(mu) > WIND_UP,
         }
         u = samples.array("a_over_v") if source_of(info) in late else np.zeros_like(slip)

@@ -82,6 +82,7 @@ def made(rng, kmh, a, tau, values, vehicle, reason):
     for w in WHEELS:
         driven = w in vehicle.driven
         slip = (of_traction if driven else 0.0) + offset + tau * a / v + 0.0003 * rng.normal(size=t.size)
+        slip += values.get("spin", 0.0) * np.exp(-(((t - 6.5) / 0.2) ** 2))
         columns |= {f"slip_{w}": slip, f"mu_{w}": mu if driven else np.full(t.size, np.nan)}
         columns |= {f"slip_min_{w}": -0.01 + 0.0 * t, f"slip_max_{w}": 0.01 + 0.0 * t}
         columns |= {f"spin_{w}": np.zeros(t.size, bool), f"minor_{w}": np.zeros(t.size, bool)}
@@ -126,6 +127,12 @@ def test_slopes_per_bin_are_the_ones_put_in(worn):
     truth = chord(dry.mu_range, 1.0, SEDAN.mu_max)
     assert abs(1.0 / dry.slope - 1.0 / truth) < 1.5 * half  # one experiment: 19 of 20 are within one half
     assert half * DRY_SLOPE < 0.1
+
+
+def test_a_wheel_slides_on_its_way_to_a_spin_and_back(worn):
+    spun = Made(grid(WORN | {"spin": 0.3}))
+    slopes = [[r.slope for r in slip_slopes(c, plan(c, ["tyre"])).rows if r.reliable] for c in (spun, worn)]
+    assert slopes[0] == pytest.approx(slopes[1], rel=0.05)
 
 
 def test_a_late_velocity_is_found_and_taken_off(worn):

@@ -21,9 +21,10 @@ from aqualog.model.scenario import SURFACES, Lane, Profile, Scenario
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
 from aqualog.thesis.checks.resistance import CONFIGURATIONS, LOADED, SLOW, UNLOADED, at_speeds
+from aqualog.thesis.checks.spins import SOON
 from aqualog.thesis.claims import NEEDS_DATA, Check, Checks, judge, limit
 from aqualog.thesis.evidence.drives import drives, made, variants
-from aqualog.thesis.evidence.passes import HIGH, LOW, MEDIUM, SLOPE_EDGES, Pass, drive_pass, figures_of, initial_slope
+from aqualog.thesis.evidence.passes import HIGH, LOW, MEDIUM, SLOPE_EDGES, Pass, figures_of, initial_slope
 from aqualog.thesis.evidence.scenes import MANY, SOME, SceneRun, known, run_of
 from aqualog.thesis.evidence.seeds import (
     PASS_SEEDS,
@@ -36,6 +37,7 @@ from aqualog.thesis.evidence.seeds import (
     by_passes,
     cells_of,
     estimate,
+    first_speed,
     mean,
     mean_of,
     said,
@@ -50,6 +52,7 @@ __all__ = ["CHECKS"]
 WORN = Pass(94, wiggles=True)
 VERY_WORN = Pass(100, tyre="very_worn_summer", h=0.8e-3, wiggles=True)
 DRY_VERY_WORN = Pass(80, tyre="very_worn_summer", h=0.0, wiggles=True)
+FULL_GRID = tuple(replace(VERY_WORN, kmh=v, wiggles=False) for v in range(104, 140, 4))  # half stop, as in C17
 FALLING = ("very worn", "very worn 0.6 mm", "very worn 2.0 mm", "worn", "worn medium", "worn high")
 DEPTHS = (0.8e-3, 1.1e-3, 1.3e-3, 2.0e-3)  # [m]
 RAMPS = tuple(Pass(v, a=1.0, wiggles=True) for v in (78, 94))
@@ -70,21 +73,13 @@ def slopes_of(table: Table, p: Pass, speeds: Sequence[float], wheel: str = "rr")
 def _c48(table: Table) -> Check:
     wet, dry = table[VERY_WORN].of("slope_rr"), mean(table[DRY_VERY_WORN].of("slope_rr"))
     value, ci = estimate(lambda r: mean(wet[r]) / dry, wet.size)
-    away = _full_speed(VERY_WORN) - VERY_WORN.kmh
-    is_near = abs(away - BELOW_FULL) <= BELOW_TOLERANCE
-    outcome = (
-        f"{mean(wet):.1f} of {dry:.1f}: {told(value, ci, 2)}; full aquaplaning of an even contact {away:.0f} km/h "
-        "higher"
-    )
-    late = "" if is_near else " The even contact of this tyre ends later than the thesis reports of its own."
+    stopped = cells_of(table, FULL_GRID, "stop_s") < SOON
+    full, full_ci = estimate(first_speed([p.kmh for p in FULL_GRID], stopped), wet.size)
+    is_near = abs(full - VERY_WORN.kmh - BELOW_FULL) <= BELOW_TOLERANCE
+    outcome = f"{mean(wet):.1f} of {dry:.1f}: {told(value, ci, 2)}; full aquaplaning at {told(full, full_ci)} km/h"
+    late = "" if is_near else " This tyre floats fully at another speed than the thesis reports of its own."
     whole, fields = ci[1] < 0.8 and is_near, {"away": late}
     return judge("C48.passes", outcome, whole=whole, part=value < 1.0, value=value, ci95=ci, fields=fields)
-
-
-def _full_speed(p: Pass) -> float:
-    """Speed of full aquaplaning of the rear right wheel on the lane of a pass, median. [km/h]"""
-    _, columns, _ = drive_pass(p, PASS_SEEDS[0])
-    return float(np.nanmedian(columns["true_full_speed_rr"])) * 3.6
 
 
 def _c49(table: Table) -> Check:
@@ -455,7 +450,7 @@ def _pressure_and_tread(plan: Plan) -> Check:
 
 CHECKS = (
     Maker(("C47",), detected, PASS_SEEDS, spreads=True),
-    by_passes("C48", lambda: (VERY_WORN, DRY_VERY_WORN), _c48),
+    by_passes("C48", lambda: (VERY_WORN, DRY_VERY_WORN, *FULL_GRID), _c48),
     by_passes("C49", lambda: (*at_speeds(WORN), *RAMPS), _c49),
     by_passes("C50", lambda: (WORN, *(q for h in DEPTHS for q in at_speeds(replace(WORN, h=h)))), _c50),
     by_passes("C51", lambda: (q for name in FALLING for q in at_speeds(_wiggling(name))), _c51),

@@ -193,7 +193,7 @@ class PassFigures:
     delta_a: float  # mean resistance measure (2.9) on the lane [m/s^2]
     delta_a_dry: float  # before the entry
     rise_s: float  # resistance beyond half of its mean on the lane
-    lever: float  # torque of the water against the front right wheel over its load [m]
+    lever: float  # torque of the water against the front right wheel over its load, as long as it turns [m]
     yaw: float  # largest heading on the lane [rad]
     slope_rl: float  # slip slope at zero slip [-]
     slope_rr: float
@@ -244,7 +244,7 @@ def figures_of(p: Pass, seed: int) -> PassFigures:
         delta_a=level,
         delta_a_dry=dry,
         rise_s=_first(t, on & (delta_a - dry > 0.5 * (level - dry))) - ENTRY,
-        lever=float(np.mean(c["true_water_torque_fr"][inner] / c["true_load_fr"][inner])),
+        lever=float(np.mean((c["true_water_torque_fr"] / c["true_load_fr"])[inner & (c["omega_fr"] > STILL)])),
         yaw=float(np.abs(np.cumsum(c["yaw_rate"]) * dt)[on].max()),
         slope_rl=slopes["rl"],
         slope_rr=slopes["rr"],

@@ -57,6 +57,7 @@ def test_a_fast_pass_loses_the_wheel():
     assert f.stop_s < 0.5
     assert f.low_slip == pytest.approx(-10.0, abs=0.1)
     assert f.gone_still_s < 1.0
+    assert f.lever > 0.03  # a wheel that stands says nothing on where its load acts
 
 
 def test_points_of_a_brush_give_its_initial_slope():
@@ -307,8 +308,8 @@ CASES = [
     ("C45", lambda p, _: {"delta_a": 0.3 - 1e-6 * (p.p - 1.9e5) - 1e-4 * (p.load_front + p.load_rear)}, REPRODUCED),
     ("C45", lambda p, _: {"delta_a": 0.3 + 1e-6 * (p.p - 1.9e5) - 1e-4 * (p.load_front + p.load_rear)}, DIFFERENCE),
     ("C45", lambda p, _: {"delta_a": 0.3}, NOT_REPRODUCED),
-    ("C48", lambda p, _: {"slope_rr": 10.0 if p.h else 30.0}, DIFFERENCE),
-    ("C48", lambda p, _: {"slope_rr": 28.0 if p.h else 30.0}, DIFFERENCE),
+    ("C48", lambda p, _: {"slope_rr": 10.0 if p.h else 30.0, "stop_s": 0.3 if p.kmh > 120 else np.inf}, REPRODUCED),
+    ("C48", lambda p, _: {"slope_rr": 10.0 if p.h else 30.0, "stop_s": 0.3 if p.kmh > 130 else np.inf}, DIFFERENCE),
     ("C48", lambda p, _: {"slope_rr": 30.0}, NOT_REPRODUCED),
     ("C50", lambda p, s: {"slope_rr": 20.0 + s}, REPRODUCED),
     ("C50", lambda p, s: {"slope_rr": 20.0 + s - (1e4 * p.h if p.kmh > 100 else 0)}, DIFFERENCE),
@@ -396,8 +397,3 @@ def test_shares_come_with_their_interval(verdict, monkeypatch):
     (check,) = MAKERS["C14"](Plan(SEEDS))
     assert check.value == 0.25
     assert check.ci95 == wilson(1, 4)
-
-
-def test_C48_asks_how_far_below_full_aquaplaning_it_was(verdict, monkeypatch):
-    monkeypatch.setattr(slip_slope, "_full_speed", lambda p: p.kmh + 22.0)
-    assert verdict("C48", lambda p, _: {"slope_rr": 10.0 if p.h else 30.0}) == REPRODUCED
