@@ -140,9 +140,10 @@ def odd_wheels(found: Sequence[PerTurn]) -> tuple[Remainder, ...]:
         if not f.found or f.amplitude < ODD or times < TIMES or f"omega_{f.wheel}" in rings:
             continue
         how = f"varying {_often(f.order)} per turn by {f.amplitude:.2%}, {times:.0f} times as much as any other wheel's"
+        how = f"the speed of wheel {f.wheel.upper()}, {how}"
         p = tempered(1.0 / (1.0 - SOUND * math.e * f.p_value * math.log(max(f.p_value, 1e-300))))
         nearest = _RING.name if f.order == 1 and f.kind == "ring" else None
-        said = f"Unexplained: the speed of wheel {f.wheel.upper()}, {how} (probability {p:.2f})."
+        said = f"Unexplained: {how} (probability {p:.2f})."
         made, half = f.amplitude * np.cos(f.order * angle), 0.5 * (f.high - f.low)
         out.append(Remainder(
             f"slip_{f.wheel}", ("angle",), math.nan, f.p_value, angle[:, None], made, made - half, made + half, (),

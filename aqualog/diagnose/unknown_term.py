@@ -81,7 +81,7 @@ ALIKE = 0.9  # cosine from which a known effect looks nearly the same
 
 def describe(mechanism: Mechanism, r: Remainder) -> str:
     """Sentences: mechanism and coordinate, its largest value, coordinates that explain it as well, similar effects."""
-    title = _channel(r)
+    title = _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title.lower() if r.channel in CHANNELS else r.channel)
     how = r.manner or f"goes with {' and '.join(map(_title, r.depends_on))}"
     text = f"Unexplained: {mechanism.title} {how} (probability {r.probability:.2f}"
     text += f"; {r.share:.0%} of the variance of the {title}"
@@ -104,13 +104,10 @@ def describe(mechanism: Mechanism, r: Remainder) -> str:
 
 def short_form(remainder: Remainder) -> str:
     """`a force on the car that goes with speed`, `a force on the car from 66 s to 145 s`."""
-    title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), _channel(remainder))
+    elsewhere = "" if remainder.manner else remainder.channel
+    title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), elsewhere)
     how = remainder.manner or f"that goes with {' and '.join(map(_title, remainder.depends_on))}"
-    return f"{title} {how}"
-
-
-def _channel(r: Remainder) -> str:
-    return _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title.lower() if r.channel in CHANNELS else r.channel)
+    return f"{title} {how}".strip()
 
 
 def _title(name: str) -> str:
