@@ -7,14 +7,11 @@ from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED, combin
 from aqualog.thesis.evidence.seeds import PASS_SEEDS, Plan
 
 SEEDS = tuple(range(2001, 2007))
-# three in four spin-ups begin with contact left, the criterion wants four in five (C4); the rear wheels spin up later
-# than the front ones stop (C16); new winter tyres have spin-downs at 130 km/h (C19); the film's and the shift's drag grow
-# with depth (C38); pressure changes the contact and with it the resistance: C43 and C45 cannot both hold (audit E21);
+# three in four spin-ups begin with contact left, the criterion wants four in five (C4); rear wheels spin up late (C16);
+# new winter tyres dip at 130 km/h (C19); drag grows with depth (C38) and falls with pressure (C43 against C45, E21);
 # 0.2 m/s² are reached before the contact has lost 30 % (C44)
 ELSE = dict.fromkeys(("C4", "C16", "C38", "C44", "C55"), DIFFERENCE) | dict.fromkeys(("C19", "C43"), NOT_REPRODUCED)
-# one pass in two has a dip at 89 km/h (C14); left and right differ by 0.01 (C23); the depth moves the rear slope by more
-# than runs scatter (C50); the interval of six seeds is wider than the 10 km/h it must lie in (C17); a few cases of
-# acceleration in 27 are mixed (C21): the seeds decide
+# which side they fall on is the business of the seeds; with six of them the interval of C17 is wider than it may be
 AT_THE_EDGE = {"C3", "C14", "C17", "C21", "C23", "C50"}
 LONG = {"C12", "C20", "C22", "C49", "C51"}  # 7 to 19 s each
 MAKERS = {
