@@ -26,15 +26,7 @@ _Key = TypeVar("_Key", bound=Hashable)
 
 
 class Extremes:
-    """Two rows for each stretch of a drive: its least and greatest value, in the order of their times.
-
-    Parameters
-    ----------
-    rows : int
-        Of the drive.
-    dt_ns : int
-        [ns]
-    """
+    """Two rows for each stretch of a drive of so many rows: least and greatest value, in the order of their times."""
 
     def __init__(self, rows: int, dt_ns: int) -> None:
         self._length = max(2, -(-rows // STRETCHES))

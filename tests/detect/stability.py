@@ -22,15 +22,11 @@ DEAD, GAIN = 0.04, 12e3  # [rad/s] of the yaw rate, [N m s/rad] of torque beyond
 INNER_FRONT, INNER_REAR, OUTER_FRONT = 700.0, 900.0, 1800.0  # [N m] at most
 
 
-def smoothed(x, tau, dt):
-    return lowpass(x, UNSET, tau=tau, dt=dt)[0]
-
-
 def torques(run, drive):
     """Torques of the brakes (4, n) [N m] by the yaw rate that a run has shown against the one that is steered."""
     c, dt = run.truth.columns, run.truth.t[1] - run.truth.t[0]
     v, law = np.maximum(c["v_x"], 5.0), understeer_gradient(drive.tyre_front.cornering_slope)
-    steered = smoothed(c["steer_angle"] * v / (drive.vehicle.wheelbase + law * v**2), 0.08, dt)
+    steered, _ = lowpass(c["steer_angle"] * v / (drive.vehicle.wheelbase + law * v**2), UNSET, tau=0.08, dt=dt)
     steered = np.clip(steered, -0.95 * G / v, 0.95 * G / v)
     lacks = np.where(c["v_x"] < 6.0, 0.0, (steered - c["yaw_rate"]) * np.sign(steered))
     under, over = (GAIN * np.maximum(x - DEAD, 0.0) for x in (lacks, -lacks))
@@ -42,7 +38,7 @@ def torques(run, drive):
         grip = 0.75 * c[f"true_mu_max_{w}"] * c[f"true_load_{w}"] * drive.vehicle.r_e_f
         holds = np.clip((c[f"true_slip_{w}"] + 0.25) / 0.15, 0.0, 1.0)
         holds *= np.clip((c[f"true_contact_{w}"] - 0.1) / 0.2, 0.0, 1.0)
-        out[i] = smoothed(np.minimum(out[i], grip) * holds, 0.05, dt)
+        out[i] = lowpass(np.minimum(out[i], grip) * holds, UNSET, tau=0.05, dt=dt)[0]
     return run.truth.t, -out
 
 
@@ -51,7 +47,7 @@ def controlled(drive, believed, known):
     run = simulation.simulate(drive)
     for _ in range(3):
         t, braked = torques(run, drive)
-        cut = smoothed((braked < -60.0).any(axis=0).astype(float), 0.15, t[1] - t[0])
+        cut, _ = lowpass((braked < -60.0).any(axis=0).astype(float), UNSET, tau=0.15, dt=t[1] - t[0])
         share = tuple(zip(t[::20].tolist(), (1.0 - cut[::20]).tolist(), strict=True))
         fine = np.arange(round(drive.duration_s / simulation.STEP_S) + 1) * simulation.STEP_S
         applied = np.stack([np.interp(fine, t, x) for x in braked], axis=1)

@@ -168,14 +168,18 @@ def test_without_torque_it_does_not_run():
     assert found["margin"] == ("torque_rl", "torque_rr")
 
 
-FALSE = (("rough_asphalt", 30), ("torque_vectoring", 20), ("gear_shifts", 23), ("snow", 300), ("split_friction", 303))
+DRY = (
+    ("rough_asphalt", 30, 0.5), ("torque_vectoring", 20, 0.5), ("gear_shifts", 23, 0.5), ("snow", 300, 0.5),
+    ("split_friction", 303, 0.5), ("pressure_loss", 71004, 1.0), ("dropouts", 71496, 1.0),
+)  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "seed"), FALSE)
-def test_a_dry_road_is_none(name, seed):
-    """No trailer by noise, a curve loads the outer wheels, a torque is late; snow slips by the traction alone."""
+@pytest.mark.parametrize(("name", "seed", "most"), DRY)
+def test_a_dry_road_warns_not(name, seed, most):
+    """Noise, a curve, torques that are late or stand still, snow that slips by traction, a tyre that loses its air."""
     drawn = draw(name, seed, SCORING_POOL)
     signals = as_signals(simulate(drawn.scenario, drawn.model), vehicle=drawn.believed, truth=False)
     found = detect_drive(signals, drawn.believed)
-    assert found.features["water_probability"].max() < 0.5
-    assert document(found, log="x")["margin"] is None
+    assert found.features["water_probability"].max() < most
+    least = document(found, log="x")["margin"]
+    assert least is None or (least["warned_s"] is None and most > 0.5)

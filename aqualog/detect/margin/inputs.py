@@ -24,23 +24,18 @@ JUMP = 0.02  # [-] of the traction within a tenth of a second: a gear shift, whi
 HOLD = 0.3  # [s] after it
 TAU_JUMP = 0.1  # [s]
 STANDS = 0.25  # [s] a wheel speed that does not change by a bit for longer has stopped coming
+HELD = 0.5  # [s] the same of a torque, while that of the axle's other wheel comes
 
 
 class Reader:
-    """Turns scenes into the inputs of the filter, piece by piece.
-
-    Parameters
-    ----------
-    dt : float
-        Sample time. [s]
-    """
+    """Turns scenes into the inputs of the filter, piece by piece; `dt` is the sample time. [s]"""
 
     def __init__(self, vehicle: Vehicle, dt: float) -> None:
         self._vehicle = vehicle
         self._dt = dt
         self._slow = {"f": UNSET, "r": UNSET}
         self._left = 0
-        self._stands = dict.fromkeys(WHEELS, (UNSET, 0))
+        self._unchanged = dict.fromkeys((f"{stem}_{w}" for stem in ("omega", "torque") for w in WHEELS), (UNSET, 0))
 
     def push(self, scene: Scene) -> Inputs:
         """Return the inputs of the next piece, (n,)."""
@@ -49,6 +44,8 @@ class Reader:
         none = np.full(scene.size, np.nan)
         u = self._traction(scene)
         jump = self._jumps(u[0] + u[1], u[2] + u[3])
+        held = [self._stands(scene, f"torque_{w}", HELD) for w in WHEELS]
+        jump |= (held[0] ^ held[1]) | (held[2] ^ held[3])
         with np.errstate(invalid="ignore"):
             rolls = (v > V_MIN) & ~scene.is_braking & ~jump
             trusted = rolls & (a < A_MOST) & (a > A_LEAST) & ~(np.abs(f["a_y_slow"]) > A_Y_MAX)
@@ -68,10 +65,15 @@ class Reader:
         v = scene.f.get(f"v_line_{wheel}")
         if v is None:
             return None
-        omega, (last, run) = scene.columns[f"omega_{wheel}"], self._stands[wheel]
-        bits, run = lasting(np.diff(omega, prepend=last) == 0.0, run, least=max(2, round(STANDS / self._dt)))
-        self._stands[wheel] = (float(omega[-1]), run)
-        return np.where(bits, np.nan, v)
+        return np.where(self._stands(scene, f"omega_{wheel}", STANDS), np.nan, v)
+
+    def _stands(self, scene: Scene, signal: str, seconds: float) -> BoolArray:
+        """Where a signal has not changed by a bit for so long; one that the drive does not have does not change."""
+        x, (last, run) = scene.columns.get(signal, np.zeros(scene.size)), self._unchanged[signal]
+        least = max(2, round(seconds / self._dt))
+        bits, run = lasting(np.diff(x, prepend=last) == 0.0, run, least=least)
+        self._unchanged[signal] = (float(x[-1]), run)
+        return bits
 
     def _jumps(self, front: FloatArray, rear: FloatArray) -> BoolArray:
         """Where the traction of an axle has just changed faster than torque signals follow."""

@@ -272,7 +272,11 @@ def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
     # without a slip the distance is what was assumed before: no reason to warn
     m.out[1] = near * wet if m.x[1, 1] < _UNKNOWN else 0.0
     m.out[7] = L
-    m.out[8] = m.out[4] + v
+    # a tyre that loses its air only slips, and alone
+    x, drags = m.x[0], m.x[1, 0] >= _UNKNOWN or m.x[0, 0] > math.asinh(p.drags / p.scale_R)
+    both = x[1] * x[2] > 0.0 and abs(x[2]) > p.both
+    m.out[8] = 1.0 if drags or both or max(x[3], x[4]) > p.shakes else 0.0
+    m.out[9] = m.out[4] + v
 
 
 @part

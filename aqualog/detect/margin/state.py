@@ -23,8 +23,9 @@ FEATURES = ("drag", "slip_more", "slip_less", "shake_more", "shake_less")
 side that deviates more and on the other one, log variance of both. [-]"""
 COVARIATES = 3  # 1, log of the speed, traction
 
-OUTPUTS = ("p_water", "p_near", "low", "q25", "median", "q75", "high", "contact", "v_full")
-"""Rows of what a scan returns: probabilities [-], quantiles of the distance [m/s], contact share [-], speed [m/s]."""
+OUTPUTS = ("p_water", "p_near", "low", "q25", "median", "q75", "high", "contact", "shows", "v_full")
+"""Rows of what a scan returns: probabilities [-], quantiles of the distance [m/s], contact share [-], whether
+drag, shake or the slip of both sides is more than that of the dry road (1 or 0), speed [m/s]."""
 ROWS = 6  # steps of the window
 COLUMNS = 15  # means of a step: inputs, variance of both slips within it, and the slips of dry wheels by the traction
 
@@ -62,6 +63,9 @@ class FilterParams(NamedTuple):
     mistaken: float = 1.0 / 100.0  # of water to another surface and back
     among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
     start: tuple[float, float, float] = (0.96, 0.02, 0.02)  # dry, wet, other; with 0.15 trailers were rain
+    drags: float = 0.05  # [m/s^2] that water near full aquaplaning takes at least
+    shakes: float = 2.0  # [-] log variance that it adds where it takes less
+    both: float = 1.0  # [-] slip of the side that deviates less, where it does neither
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
     heard: float = 1e-3  # [-] probability of water from which its distances are compared
     weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay

@@ -62,7 +62,7 @@ class MarginWatch:
         with np.errstate(invalid="ignore"):
             wet = rows["p_water"] > PROBABLE
             near = rows["p_near"] > self._setup.threshold
-        active, self._run = lasting(near, self._run, least=self._least)
+        active, self._run = lasting(near & (rows["shows"] > 0.0), self._run, least=self._least, stays=near)
         features = {name: np.where(wet, rows[row], np.nan) for name, row in FEATURES.items()}
         margin = features["aquaplaning_margin"]
         evidence = {"v_x": ("first", v), "margin_min": ("min", margin), "contact_min": ("min", rows["contact"])}
@@ -71,13 +71,7 @@ class MarginWatch:
 
 
 class Least:
-    """The least distance of a drive, gathered piece by piece.
-
-    Parameters
-    ----------
-    dt : float
-        Sample time. [s]
-    """
+    """The least distance of a drive, gathered piece by piece; `dt` is the sample time. [s]"""
 
     def __init__(self, dt: float) -> None:
         self._dt = dt
