@@ -136,6 +136,11 @@ def diagnose(
         last.append(lambda: next_manoeuvre(evidence, rivals, noises, model))
     done = beside(lambda f: f(), last)
     gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
+    fails = gained is not None and not gained.in_sample and gained.log_score <= 0.0
+    if fails and outcome.verdict in ("named", "compound"):
+        note = "Not named: held-out drives are not predicted better with it."
+        rings = frozenset(c.effect for c in seen.causes)
+        outcome = outcome._replace(verdict="cannot_tell", certain=rings, notes=(*outcome.notes, note))
     p, reason = found.significance.p_value, f" ({short_form(forms[0])})" if forms else ""
     sentence = verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,

@@ -260,6 +260,15 @@ def test_gain_is_on_unseen_drives_where_there_are_any():
     assert {t.effect.name for t in d.deviations}.isdisjoint({t.effect.name for t in d.model.terms} | {"head_wind"})
 
 
+def test_what_does_not_predict_held_out_drives_is_no_name():
+    with_it, clean = noisy(term("payload_mass", delta_mass=250.0)), noisy(seed=4)
+    d = diagnose([("a", with_it)], CAR, holdout=[("b", clean)], options=QUICK)
+    assert d.gain.log_score < 0.0
+    assert d.verdict == "cannot_tell"
+    assert "fails a check" in d.sentence
+    assert "held-out drives are not predicted better" in d.notes[-1]
+
+
 def test_a_late_velocity_is_named_without_one_of_the_wheels(monkeypatch):
     ask(monkeypatch, ("signal_delay@v_x", "signal_delay@a_x", "signal_delay@torque", "clock_skew"))
     d = told(log=noisy(term("signal_delay", "v_x", delay=0.1), drop=["omega_rr"]))
