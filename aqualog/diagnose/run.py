@@ -136,11 +136,7 @@ def diagnose(
         last.append(lambda: next_manoeuvre(evidence, rivals, noises, model))
     done = beside(lambda f: f(), last)
     gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
-    fails = gained is not None and not gained.in_sample and gained.log_score <= 0.0
-    if fails and outcome.verdict in ("named", "compound"):
-        note = "Not named: held-out drives are not predicted better with it."
-        rings = frozenset(c.effect for c in seen.causes)
-        outcome = outcome._replace(verdict="cannot_tell", certain=rings, notes=(*outcome.notes, note))
+    outcome = _by_gain(outcome, gained, frozenset(c.effect for c in seen.causes))
     p, reason = found.significance.p_value, f" ({short_form(forms[0])})" if forms else ""
     sentence = verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
@@ -220,6 +216,15 @@ def _gained(
         unseen or ready, (*models[:2], elsewhere(models[2])) if unseen else models, noise, seed=options.seed,
         in_sample=not unseen, consequences=effects,
     )  # fmt: skip
+
+
+def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str]) -> Outcome[Option]:
+    """The outcome, without a name where held-out drives are not predicted better; `rings` are certain without them."""
+    predicts = gained is None or gained.in_sample or gained.log_score > 0.0
+    if predicts or outcome.verdict not in ("named", "compound"):
+        return outcome
+    note = "Not named: held-out drives are not predicted better with it."
+    return outcome._replace(verdict="cannot_tell", certain=rings, notes=(*outcome.notes, note))
 
 
 def _led(drive: Drive, model: Model) -> FloatArray:
