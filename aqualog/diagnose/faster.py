@@ -131,16 +131,14 @@ def odd_wheels(found: Sequence[PerTurn]) -> tuple[Remainder, ...]:
 
     A force or torque that comes with every turn, a tyre out of true, an uneven pick-up: the log does not show which.
     """
-    rings = {f"omega_{f.wheel}" for f in found}.intersection(x for c in to_causes(found) for x in c.explains)
     out = []
     angle: FloatArray = np.linspace(0.0, 2.0 * math.pi, POINTS)
     for f in found:
-        others = [o.amplitude for o in found if o.order == f.order and o.wheel != f.wheel and o.kind != "untested"]
-        times = f.amplitude / max(*others, 1e-5) if others else 0.0
-        if not f.found or f.amplitude < ODD or times < TIMES or f"omega_{f.wheel}" in rings:
+        times = _times(f, found)
+        if not times:
             continue
-        how = f"varying {_often(f.order)} per turn by {f.amplitude:.2%}, {times:.0f} times as much as any other wheel's"
-        how = f"the speed of wheel {f.wheel.upper()}, {how}"
+        how = f"the speed of wheel {f.wheel.upper()}, varying {_often(f.order)} per turn by {f.amplitude:.2%}, "
+        how += f"{times:.0f} times as much as any other wheel's"
         p = tempered(1.0 / (1.0 - SOUND * math.e * f.p_value * math.log(max(f.p_value, 1e-300))))
         nearest = _RING.name if f.order == 1 and f.kind == "ring" else None
         said = f"Unexplained: {how} (probability {p:.2f})."
@@ -150,6 +148,14 @@ def odd_wheels(found: Sequence[PerTurn]) -> tuple[Remainder, ...]:
             nearest, 1.0 if nearest else math.nan, said, "slip", "-", p, how,
         ))  # fmt: skip
     return tuple(out)
+
+
+def _times(f: PerTurn, found: Sequence[PerTurn]) -> float:
+    """How many times as much as any other wheel's a speed varies, where that is an unknown form; else 0."""
+    is_ring = any(f"omega_{f.wheel}" in c.explains for c in to_causes(found))
+    others = [o.amplitude for o in found if o.order == f.order and o.wheel != f.wheel and o.kind != "untested"]
+    times = f.amplitude / max(*others, 1e-5) if others and f.found and not is_ring else 0.0
+    return times if f.amplitude >= ODD and times >= TIMES else 0.0
 
 
 def _often(order: int) -> str:
@@ -227,7 +233,7 @@ def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
     """Sentences about what is found and is no cause."""
     out, small = [], []
     for f in found:
-        if not f.found or (f.most if f.kind == "speed" else f.amplitude) < SHOWN:
+        if not f.found or (f.most if f.kind == "speed" else f.amplitude) < SHOWN or _times(f, found):
             continue
         what = f"The wheel speed{place(f.wheel)} varies {_often(f.order)} per turn by {f.amplitude:.2%}"
         if f.kind == "speed":

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from aqualog.checks.follows import Follow, follow
-from aqualog.core.errors import SignalError
+from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
@@ -34,12 +34,13 @@ from aqualog.diagnose.outcome import conclude, with_causes
 from aqualog.diagnose.records import SURE, Consequence, Diagnosis, Gain, Remainder, ResidualView, Verdict
 from aqualog.diagnose.refit import Refit, likeliest, metric
 from aqualog.diagnose.run_information import Rival
-from aqualog.diagnose.search import Option, Tell, search, simulated
+from aqualog.diagnose.search import Found, Option, Tell, search, simulated
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unknown_term import as_term, short_form
 from aqualog.diagnose.verdict import Outcome
 from aqualog.diagnose.words import term_words, verdict_sentence
+from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 
 __all__ = ["Options", "accelerometer_defect", "diagnose"]
@@ -121,12 +122,7 @@ def diagnose(
     sizes = isolate.reference_sizes(evidence, found.gram, threshold)
     before = [residual(d, model) for d in ready] if road is None else [_led(d, bare) for d in ready]
     differs, is_unclear = extended.terms != bare.terms, outcome.verdict == "cannot_tell"
-    after, settled = before, extended
-    if differs:
-        measure = metric(found.arena, found.posterior.weighings)
-        alone = likeliest(evidence, measure, evidence.residuals, bare)
-        settled = likeliest(evidence, measure, [_led(d, extended) for d in ready], extended)
-        after = [_led(d, settled) for d in ready]
+    alone, settled, after = _at_likeliest(found, evidence, bare, extended) if differs else (bare, extended, before)
     tell("searching for a run that distinguishes the causes" if is_unclear else "measuring the gain", 0.8)
     rivals = [Rival(s.option.refit, q) for s, q in outcome.rivals if s.option.refit is not None]
     last: list[Callable[[], Any]] = []
@@ -212,16 +208,40 @@ def _gained(
     effects: tuple[Consequence, ...] = ()
     if options.consequences and "mass" in vehicle.given:
         effects = consequences(vehicle, elsewhere(extended), seed=options.seed)
-    return measured_gain(
-        unseen or ready, (*models[:2], elsewhere(models[2])) if unseen else models, noise, seed=options.seed,
-        in_sample=not unseen, consequences=effects,
-    )  # fmt: skip
+
+    def measured(models: tuple[Model, Model, Model]) -> Gain:
+        return measured_gain(
+            unseen or ready, (*models[:2], elsewhere(models[2])) if unseen else models, noise, seed=options.seed,
+            in_sample=not unseen, consequences=effects,
+        )  # fmt: skip
+
+    try:
+        return measured(models)
+    except ConfigError:  # no car drives there with its likeliest values together
+        return measured((models[0], models[0], extended))
+
+
+def _at_likeliest(
+    found: Found, evidence: Evidence, bare: Model, extended: Model
+) -> tuple[Model, Model, list[FloatArray]]:  # fmt: skip
+    """Both models at the car's likeliest values, and what the second leaves of the drives."""
+    measure, left = metric(found.arena, found.posterior.weighings), [_led(d, extended) for d in evidence.drives]
+    alone = likeliest(evidence, measure, evidence.residuals, bare)
+    settled = likeliest(evidence, measure, left, extended)
+    try:
+        return alone, settled, [_led(d, settled) for d in evidence.drives]
+    except ConfigError:  # no car drives with these values together
+        return bare, extended, left
 
 
 def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str]) -> Outcome[Option]:
-    """The outcome, without a name where held-out drives are not predicted better; `rings` are certain without them."""
+    """The outcome, without a name of car or tyre where held-out drives are not predicted better.
+
+    A load, a wind or a road may be the diagnosed drive's alone; `rings` are certain without other drives.
+    """
     predicts = gained is None or gained.in_sample or gained.log_score > 0.0
-    if predicts or outcome.verdict not in ("named", "compound"):
+    stays = all(EFFECTS[c.effect].belongs in ("car", "tyre") for c in outcome.causes)
+    if predicts or not stays or outcome.verdict not in ("named", "compound"):
         return outcome
     note = "Not named: held-out drives are not predicted better with it."
     return outcome._replace(verdict="cannot_tell", certain=rings, notes=(*outcome.notes, note))

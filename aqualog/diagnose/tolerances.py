@@ -47,7 +47,7 @@ TOLERANCES: tuple[Effect, ...] = (
         cornering_slope=p.cornering_slope * [1.0 + x, 1.0 + x, 1.0, 1.0]))),
     _of("cornering_rear", "-", 0.2, _plant(lambda p, x: p._replace(
         cornering_slope=p.cornering_slope * [1.0, 1.0, 1.0 + x, 1.0 + x]))),
-    _of("friction", "-", 0.5, _plant(lambda p, x: p._replace(mu=p.mu * (1.0 + x)))),
+    _of("friction", "-", 0.5, _plant(lambda p, x: p._replace(mu=p.mu * max(1.0 + x, 0.3)))),
     _of("radius_loss", "-", 0.005, _plant(lambda p, x: p._replace(radius_loss=p.radius_loss + x))),
     _of("antenna_height", "s^2", 0.01, _channel("v_x", lambda c, x: replace(c, pitching=c.pitching + x))),
     _of("steer_offset", "rad", 5e-3, _channel("steer_angle", lambda c, x: replace(c, bias=c.bias + x))),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aqualog.diagnose import arena, faster, run
-from aqualog.diagnose.faster import Faster, joined, pooled, to_causes, why_untested, with_rings, without_known
+from aqualog.diagnose.faster import Faster, joined, pooled, remarks, to_causes, why_untested, with_rings, without_known
 from aqualog.diagnose.full_rate import PerTurn
 from aqualog.diagnose.records import Cause
 from aqualog.diagnose.seams import Seam
@@ -100,6 +100,7 @@ def test_a_wheel_that_varies_unlike_the_others_is_an_unknown_form():
     assert faster.odd_wheels([*small, replace(odd, kind="nothing")]) == ()
     (once,) = faster.odd_wheels([*(ring(w, 3e-4) for w in ("fl", "fr")), ring("rl", 1.8e-3)])
     assert once.nearest == "tone_ring"
+    assert "too little" not in " ".join(remarks([*(ring(w, 3e-4) for w in ("fl", "fr")), ring("rl", 1.8e-3)]))
 
 
 def test_what_sound_wheels_show_is_no_name():

@@ -9,13 +9,15 @@ from aqualog.diagnose import search
 from aqualog.diagnose.arena import arena_of, known_only
 from aqualog.diagnose.compete import compete
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.hypotheses import Hypothesis, with_values
+from aqualog.diagnose.evidence import FARTHEST
+from aqualog.diagnose.hypotheses import Hypothesis, residual, with_values
 from aqualog.diagnose.hypotheses import simulated as shown
 from aqualog.diagnose.refit import KNOWN, likeliest, metric, refit
 from aqualog.diagnose.search import simulated
 from aqualog.diagnose.sets import fitted_in
+from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model.effects import EFFECTS
-from aqualog.model.term import Model
+from aqualog.model.term import Model, Term
 from tests.diagnose.test_drive import CAR, NOISY, signals, term
 
 
@@ -177,3 +179,11 @@ def test_the_cars_own_values_are_likeliest_within_the_tolerance_and_a_known_term
     known = Model((term("tyre_radius", "rl", delta=0.05),))
     kept = likeliest(evidence, measure, evidence.residuals, known).terms[0]
     assert kept.values["delta"] == 0.05
+
+
+def test_a_car_drives_at_two_deviations_of_every_tolerance():
+    d = prepare(signals(drop=("tie_rod_fl", "tie_rod_fr")), CAR, "a")
+    for e in TOLERANCES:
+        for x in (-FARTHEST, FARTHEST):
+            r = residual(d, Model((Term(e, {"by": x * e.parameters[0].sigma}),)))
+            assert np.nanmax(np.abs(r[:, d.mask])) < 2.0, (e.name, x)
