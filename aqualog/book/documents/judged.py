@@ -119,8 +119,8 @@ DIAGNOSE = Document(
         )),
         obj("gain", "what the causes gain in the model; null without causes", (
             by_name("channel", "errors by residual", _ERRORS),
-            number("heldout_log_score_gain", "nats", "gain beyond the car's likeliest values; null without held-out drives",
-                   null=True),
+            number("heldout_log_score_gain", "nats",
+                   "gain beyond the car's likeliest values; null without held-out drives", null=True),
             interval("ci95", "nats", "95 % interval"),
             number("in_sample_log_score_gain", "nats", "gain on the diagnosed drives; null with held-out ones",
                    null=True),
