@@ -12,7 +12,7 @@ from aqualog.config.signal_map import load_signal_map
 from aqualog.config.vehicle import load_vehicle
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Origin
-from aqualog.diagnose.faster import remarks, to_causes, why_untested
+from aqualog.diagnose.faster import odd_wheels, remarks, to_causes, why_untested
 from aqualog.diagnose.full_rate import PerTurn, _Fit, _lossless, per_turn, wheel_columns
 from tests.blind.world.cases import CARS, Hidden, Spec, make_case
 
@@ -207,7 +207,9 @@ def test_what_is_too_small_is_not_listed():
 def test_a_second_order_is_no_tone_ring():
     results = tuple(found(drive(uneven={"fl": ring(2e-3, 2)})).values())
     assert to_causes(results) == ()
-    assert "(front left wheel) varies twice per turn by 0.2" in remarks(results)[0]
+    (form,) = odd_wheels(results)
+    assert "wheel FL, varying twice per turn by 0.2" in form.sentence
+    assert remarks(results) == ()
 
 
 def test_causes_by_wheel_axle_and_side():
