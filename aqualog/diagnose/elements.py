@@ -41,7 +41,6 @@ Key = tuple[str, str]  # mechanism and coordinate
 class _Found(NamedTuple):
     kind: str
     manner: str
-    gain: float
     basis: Basis
     tried: float
 
@@ -81,7 +80,7 @@ def with_elements(arena: Arena) -> Arena:
         m, weight, score = s
         several = intervals(weight, score)
         found = [waves.get((m.name, n)) for n in along]
-        found += [_stepped(along["t"], several[:k], weight, score) for k in sorted({1, len(several)} - {0})]
+        found += [_stepped(along["t"], several[:k]) for k in sorted({1, len(several)} - {0})]
         found += [patches.get((m.name, n)) for n in along]
         return [(m, f) for f in found if f is not None]
 
@@ -109,9 +108,7 @@ def _extended(arena: Arena, made: Sequence[tuple[Mechanism, _Found]]) -> Arena:
     )  # fmt: skip
 
 
-def _stepped(
-    t: FloatArray, edges: Sequence[tuple[int, int, int]], weight: FloatArray, score: FloatArray
-) -> _Found:  # fmt: skip
+def _stepped(t: FloatArray, edges: Sequence[tuple[int, int, int]]) -> _Found:
     """Intervals over time as a form of one value each."""
     columns = np.array([trapezoid(t.size, *x) for x in edges]).T
     points = np.linspace(t[0], t[-1], 4 * POINTS)
@@ -123,8 +120,7 @@ def _stepped(
         inside = f"from {begin} to {end}" if low > 0 else f"until {end}"
         said.append(inside if high < t.size else f"from {begin} on")
     kind = "interval" if len(edges) == 1 else "intervals"
-    gain = gain_of(columns.T, weight, score)
-    return _Found(kind, " and ".join(said), gain, basis, (0.5 * EDGES**2) ** len(edges))
+    return _Found(kind, " and ".join(said), basis, (0.5 * EDGES**2) ** len(edges))
 
 
 def _patches(name: str, x: FloatArray, weights: FloatArray, scores: FloatArray) -> list[_Found | None]:
@@ -194,7 +190,7 @@ def _patch(
         (name,), own[:, None], np.eye(1), points[:, None], at_points[:, None], np.ones(points.size, dtype=bool)
     )
     unit = "m" if name == "position" else "s"
-    return _Found("patches", f"for {length:.3g} {unit} in every {period:.4g} {unit}", gain, basis, count)
+    return _Found("patches", f"for {length:.3g} {unit} in every {period:.4g} {unit}", basis, count)
 
 
 def _waves(
@@ -216,7 +212,7 @@ def _waves(
             out.append(None)
             continue
         near = best[1] + STEP * np.linspace(-0.8, 0.8, 9)
-        gain, f = max([best, *zip(_gains(near, z, w[None], s[None])[:, 0].tolist(), near.tolist(), strict=True)])
+        _, f = max([best, *zip(_gains(near, z, w[None], s[None])[:, 0].tolist(), near.tolist(), strict=True)])
         columns = np.zeros((x.size, 2))
         columns[known] = _circle(2.0 * np.pi * f * z).T
         points = np.linspace(0.0, 1.0, max(POINTS, min(1200, int(12 * f))))
@@ -225,7 +221,7 @@ def _waves(
         basis = Basis((name,), columns, np.eye(2), grid, at_points, np.ones(points.size, dtype=bool))
         unit = "m" if name == "position" else "s"
         manner = f"in waves of {span / f:.3g} {unit}" if f >= 1.0 else ""
-        out.append(_Found("wave", manner, gain, basis, (most - LEAST_PERIODS) / STEP))
+        out.append(_Found("wave", manner, basis, (most - LEAST_PERIODS) / STEP))
     return out
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,20 +14,9 @@ from aqualog.diagnose.hypotheses import WORTH, Hypothesis, value_in, with_values
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 
-__all__ = ["Library", "hypotheses", "library", "untested"]
+__all__ = ["evidence_of", "hypotheses", "signatures", "untested"]
 
 STEP = 0.5  # standard deviations of the prior to either side, of a finite difference
-
-
-class Library(NamedTuple):
-    """`evidence`: hypotheses with priors and bounds; `x` (g, c, k): change of the observations by one prior standard
-    deviation of each parameter, about a model whose expectation is `base` (g, c), with the road's variances `road`.
-    """
-
-    evidence: Evidence
-    x: FloatArray
-    base: FloatArray
-    road: FloatArray
 
 
 def hypotheses(passes: Passes) -> tuple[Hypothesis, ...]:
@@ -47,16 +36,27 @@ def untested(tested: Sequence[Hypothesis]) -> dict[str, str]:
     return {name: reason for name in EFFECTS if name not in names}
 
 
-def library(passes: Passes, model: Model, asked: Sequence[Hypothesis], given: Model) -> Library:
-    """Change of the observations by each hypothesis about a model, from differences of the expectation.
+def evidence_of(asked: Sequence[Hypothesis], given: Model) -> Evidence:
+    """Hypotheses with priors and bounds, as for drives; bounds count from the values of the model at hand."""
+    names = [(h, n) for h in asked for n in h.free]
+    ends = np.cumsum([0, *(len(h.free) for h in asked)]).tolist()
+    columns = tuple(tuple(range(a, b)) for a, b in pairwise(ends))
+    now = np.array([value_in(given, h, n) for h, n in names])
+    sigma, low, high, smallest = (
+        np.array([getattr(h.parameter(n), of) for h, n in names]) for of in ("sigma", "low", "high", "smallest")
+    )
+    none = np.zeros(sigma.size)
+    return Evidence(
+        (), tuple(asked), (), (), columns, sigma, low - now, high - now, smallest, none,
+        np.zeros(len(asked), dtype=bool), none, tuple("" for _ in names), none,
+    )  # fmt: skip
 
-    `given`: the model at hand, from whose values bounds count.
-    """
-    expected, road = expected_values(passes, model)
-    columns: list[FloatArray] = []
-    places, parameters = [], []
+
+def signatures(passes: Passes, model: Model, asked: Sequence[Hypothesis], expected: FloatArray) -> FloatArray:
+    """Change (g, c, k) of the observations by one prior standard deviation of each parameter, from differences of the
+    expectation about a model, whose own is `expected` (g, c)."""
+    columns = []
     for h in asked:
-        places.append(tuple(range(len(columns), len(columns) + len(h.free))))
         for n in h.free:
             p, at = h.parameter(n), value_in(model, h, n)
             ends = [min(max(at + s * STEP * p.sigma, p.low), p.high) for s in (-1.0, 1.0)]
@@ -64,19 +64,4 @@ def library(passes: Passes, model: Model, asked: Sequence[Hypothesis], given: Mo
                 expected if x == at else expected_values(passes, with_values(model, [(h, {n: x})]))[0] for x in ends
             )
             columns.append((high - low) * (p.sigma / (ends[1] - ends[0])))
-            parameters.append((p, value_in(given, h, n)))
-    sigma, low, high = (
-        np.array(x) for x in zip(*((p.sigma, p.low - now, p.high - now) for p, now in parameters), strict=True)
-    )
-    none = np.zeros(sigma.size)
-    evidence = Evidence(
-        (), tuple(asked), (), (), tuple(places), sigma, low, high, np.array([p.smallest for p, _ in parameters]),
-        none, np.zeros(len(asked), dtype=bool), none, tuple("" for _ in sigma), none,
-    )  # fmt: skip
-    # variance of a run's mean relative to one point of its lane: correlation length over distance
-    of_mean = np.zeros((len(passes.told), 1))
-    for r, told in enumerate(passes.told):
-        if told.wet is not None:
-            way = float(np.mean(told.wet.v)) * float(passes.seconds[r])
-            of_mean[r] = min(2.0 * told.scenario.tyre_front.scatter_length / max(way, 1.0), 1.0)
-    return Library(evidence, np.nan_to_num(np.stack(columns, axis=-1)), expected, road * of_mean)
+    return np.nan_to_num(np.stack(columns, axis=-1))

@@ -11,9 +11,9 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import Field, blocks_of
-from aqualog.diagnose.campaign.catalogue import Library, library
+from aqualog.diagnose.campaign.catalogue import evidence_of, signatures
 from aqualog.diagnose.campaign.noise import Fit, fit, inner
-from aqualog.diagnose.campaign.passes import RESISTANCE, Passes
+from aqualog.diagnose.campaign.passes import RESISTANCE, Passes, expected_values
 from aqualog.diagnose.campaign.refit import Refit, refit
 from aqualog.diagnose.compete import rule
 from aqualog.diagnose.competition import COARSE, Block, joined, placed
@@ -80,15 +80,25 @@ class _Ring(Field):
 
 @dataclass(frozen=True, slots=True)
 class _Stand:
-    """The runs about a refitted set: signatures there, and the scatter with all effects free."""
+    """The runs about a refitted set: signatures `x` (g, c, k) there, residual `y` (g, c) that a linear model about it
+    has without it, variances `road` (g, c), and the scatter with all effects free."""
 
     best: Refit
-    lib: Library
-    y: FloatArray  # (g, c) residual that a linear model about the set has without it
+    x: FloatArray
+    y: FloatArray
+    road: FloatArray
     scatter: Fit
 
+    @staticmethod
+    def about(best: Refit, own: Sequence[int], ring: _Ring, start: Fit | None = None) -> _Stand:
+        """`own`: columns of the set."""
+        expected, road = expected_values(ring.passes, best.model)
+        x = signatures(ring.passes, best.model, ring.evidence.asked, expected)
+        y = best.residual + x[:, :, own] @ best.theta
+        return _Stand(best, x, y, road, fit(best.residual, x, road, ring.passes.nuisances, start))
+
     def gram(self, passes: Passes, *more: FloatArray) -> FloatArray:
-        return inner(np.concatenate([self.lib.x, *more], axis=-1), self.y, passes.nuisances, self.scatter.weight)
+        return inner(np.concatenate([self.x, *more], axis=-1), self.y, passes.nuisances, self.scatter.weight)
 
 
 def compete(
@@ -101,16 +111,15 @@ def compete(
     effects, and effects are asked for only if the test for any effect finds more than chance at this `level`.
     """
     say("signatures of the effects")
-    lib = library(passes, given, asked, given)
+    evidence = evidence_of(asked, given)
     shapes, functions = _shapes_of(passes)
-    ring = _Ring(lib.evidence, *blocks_of(lib.evidence, shapes), shapes, functions, passes, given)
-    y = passes.values - lib.base
+    ring = _Ring(evidence, *blocks_of(evidence, shapes), shapes, functions, passes, given)
+    y = passes.values - expected_values(passes, given)[0]
     nothing = Refit((), np.zeros(0), given, y, np.zeros((*y.shape, 0)), at_bound=False)
-    stand = _Stand(nothing, lib, y, fit(y, lib.x, lib.road, passes.nuisances))
-    gram = stand.gram(passes)
-    plain = gram / np.outer(scale := np.append(lib.evidence.prior, 1.0), scale)
-    calibration = calibrate(lib.evidence, plain, surrogates=surrogates, level=level, seed=seed)
-    test = significance(lib.evidence, plain, calibration, level)
+    stand = _Stand.about(nothing, [], ring)
+    plain = stand.gram(passes) / np.outer(scale := np.append(evidence.prior, 1.0), scale)
+    calibration = calibrate(evidence, plain, surrogates=surrogates, level=level, seed=seed)
+    test = significance(evidence, plain, calibration, level)
     if test.p_value <= level:
         say("known effects")
         stand = _repeated(ring, stand)
@@ -120,14 +129,13 @@ def compete(
     if not forms and test.p_value <= level:
         say("refitting the sets of effects")
         options = _options(ring, stand, nothing)
-    return Found(lib.evidence, test, plain, calibration, stand.scatter, nothing, forms, options)
+    return Found(evidence, test, plain, calibration, stand.scatter, nothing, forms, options)
 
 
 def _refitted(ring: _Ring, stand: _Stand, members: Members, gram: FloatArray) -> Refit:
     linear = fitted_in(ring.known, gram, members)
-    own = [ring.evidence.asked[m] for m in members]
-    x = stand.lib.x[:, :, linear.columns]
-    return refit(ring.passes, ring.given, own, linear.mean, x, stand.scatter.weight)
+    chosen, x = [ring.known[m].tag for m in members], stand.x[:, :, linear.columns]
+    return refit(ring.passes, ring.evidence, chosen, linear.mean, x, stand.scatter.weight, ring.given)
 
 
 def _repeated(ring: _Ring, stand: _Stand) -> _Stand:
@@ -138,17 +146,14 @@ def _repeated(ring: _Ring, stand: _Stand) -> _Stand:
         best = ring.sets(ring.known, gram).best
         if best == done:
             break
-        found = _refitted(ring, stand, best, gram)
-        lib = library(ring.passes, found.model, ring.evidence.asked, ring.given)
         own = [c for m in best for c in ring.known[m].columns]
-        scatter = fit(found.residual, lib.x, lib.road, ring.passes.nuisances, stand.scatter)
-        stand, done = _Stand(found, lib, found.residual + lib.x[:, :, own] @ found.theta, scatter), best
+        stand, done = _Stand.about(_refitted(ring, stand, best, gram), own, ring, stand.scatter), best
     return stand
 
 
 def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...], _Stand]:
     """Unknown forms that no known effect replaces; the scatter is that with the forms of the best set free too."""
-    passes, k = ring.passes, stand.lib.evidence.count
+    passes, k = ring.passes, ring.evidence.count
     after: Members = ()
     for _ in range(ROUNDS):
         gram = stand.gram(passes, ring.functions)
@@ -161,8 +166,8 @@ def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...]
             ring.functions[:, :, [c - k for c in b.columns]] @ np.linalg.cholesky(b.prior)
             for b in (ring.blocks[m] for m in new)
         ]
-        x = np.concatenate([stand.lib.x, *drawn], axis=-1)
-        wider = fit(stand.best.residual, x, stand.lib.road, passes.nuisances, stand.scatter)
+        x = np.concatenate([stand.x, *drawn], axis=-1)
+        wider = fit(stand.best.residual, x, stand.road, passes.nuisances, stand.scatter)
         stand = replace(stand, scatter=wider)
     out = []
     linear = fitted_in(ring.blocks, gram, sets.best)

@@ -84,7 +84,7 @@ def _row(data: CampaignData, info: RunInfo) -> _Row | str:
     if dry.size < least:
         return f"less than {LEAST_S:g} s of dry driving"
     values = {f"dry_{w}": float(np.mean(slip[dry])) for w, (slip, _) in columns.items()}
-    told = Told(scenario, None, _driven(samples, car, dry))
+    told = Told(scenario, _driven(samples, car, dry))
     if scenario.lanes and wet.size >= least:
         asked = _driven(samples, car, wet)
         expected = respond([assemble(scenario)], np.zeros(asked.v.size, int), np.ones(asked.v.size, bool), asked)
@@ -141,14 +141,11 @@ def _coordinates(rows: Sequence[_Row]) -> dict[str, FloatArray]:
     def of(key: str) -> FloatArray:
         return np.array([float(r.info.run.values.get(key, 0.0)) for r in rows])
 
-    speed = [float(np.mean((r.told.wet or r.told.dry or _NOTHING).v)) for r in rows]
+    speed = [float(np.mean((r.told.wet or r.told.dry).v)) for r in rows]
     return {
         "v_x": np.array(speed), "depth": 1e-3 * of("water_depth_mm"), "pressure": 1e5 * of("pressure_rear_bar"),
         "load": of("load_front_kg") + of("load_rear_kg"),
     }  # fmt: skip
-
-
-_NOTHING = Driven(np.zeros(1), np.zeros(1), np.zeros((4, 1)))
 
 
 def _nuisances(rows: Sequence[_Row], names: Sequence[str]) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -38,8 +39,8 @@ class Told(NamedTuple):
     """Inputs of a run for the expectation: configuration and driving state."""
 
     scenario: Scenario
-    wet: Driven | None
-    dry: Driven | None
+    dry: Driven
+    wet: Driven | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +118,7 @@ def steady(passes: Passes, model: Model) -> Passes:
 
 
 def expected_values(passes: Passes, model: Model, *, friction: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """Expected observations of a model (g, c), and the variances (g, c) of one point by the road's fluctuation.
+    """Expected observations of a model (g, c), and their variances (g, c) by the road's fluctuation.
     `friction`: factor on that of all wheels.
     """
     q, found = passes.question, _responses(passes, model, friction)
@@ -143,4 +144,8 @@ def expected_values(passes: Passes, model: Model, *, friction: float = 1.0) -> t
         else:
             values[:, c] = means(found.slip[wheel], wet=True) - dry
             variances[:, c] = means(found.slip_variance[wheel], wet=True)
+    # of a run's mean relative to one point of its lane: correlation length over distance
+    for r, told in enumerate(passes.told):
+        way = float(np.mean(told.wet.v)) * float(passes.seconds[r]) if told.wet is not None else math.inf
+        variances[r] *= min(2.0 * told.scenario.tyre_front.scatter_length / max(way, 1.0), 1.0)
     return values, variances

@@ -13,6 +13,7 @@ from aqualog.core.intervals import student_quantile
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.campaign.noise import inner, inverse_of, prior_of
 from aqualog.diagnose.campaign.passes import Passes, expected_values
+from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.records import Estimate
 from aqualog.diagnose.refit import PRIOR_WIDTH
@@ -54,23 +55,25 @@ class Refit:
 
 
 def refit(
-    passes: Passes, given: Model, members: Sequence[Hypothesis], start: FloatArray, x: FloatArray, weight: FloatArray
-) -> Refit:
+    passes: Passes, evidence: Evidence, chosen: Sequence[int], start: FloatArray, x: FloatArray, weight: FloatArray,
+    given: Model,
+) -> Refit:  # fmt: skip
     """Fit a set by Gauss-Newton with the prior of each parameter, within its physical bounds, on a given model.
 
-    `members`: empty for the model as it is; `start` (k,): in prior standard deviations; `x` (g, c, k): change of the
+    `chosen`: hypotheses of the set; `start` (k,): in prior standard deviations; `x` (g, c, k): change of the
     observations by one of those near the start; `weight` (g, c, c): precision of each run.
     """
-    names = [(h, n) for h in members for n in h.free]
-    told = [h.parameter(n) for h, n in names]
-    now = np.array([value_in(given, h, n) for h, n in names])
-    sigma, low, high = (np.array([getattr(p, a) for p in told]) for a in ("sigma", "low", "high"))
-    low, high = (low - now) / sigma, (high - now) / sigma
+    members = tuple(evidence.asked[m] for m in chosen)
+    columns = [c for m in chosen for c in evidence.columns[m]]
+    sigma = evidence.prior[columns]
+    low, high = evidence.low[columns] / sigma, evidence.high[columns] / sigma
 
     def at(t: FloatArray) -> tuple[Model, FloatArray]:
-        # a bound in units of sigma comes back with a rounding error beyond it
-        flat = [min(max(x, p.low), p.high) for x, p in zip((now + sigma * t).tolist(), told, strict=True)]
-        own = [(h, {n: v for (o, n), v in zip(names, flat, strict=True) if o is h}) for h in members]
+        off, own = iter((sigma * t).tolist()), []
+        for h in members:
+            # a bound in units of sigma comes back with a rounding error beyond it
+            values = [(h.parameter(n), value_in(given, h, n) + next(off)) for n in h.free]
+            own.append((h, {p.name: min(max(v, p.low), p.high) for p, v in values}))
         model = with_values(given, own)
         return model, passes.values - expected_values(passes, model)[0]
 
@@ -107,7 +110,7 @@ def refit(
             break
         x, fresh = slopes(e, theta), True
     at_bound = bool(np.any(((theta <= low + EDGE) | (theta >= high - EDGE)) & (np.abs(theta) >= EDGE)))
-    return Refit(tuple(members), theta, model, e, x, at_bound)
+    return Refit(members, theta, model, e, x, at_bound)
 
 
 def settled(found: Refit, passes: Passes, weight: FloatArray, by: NDArray[np.int64] | None = None) -> FloatArray:
