@@ -34,24 +34,24 @@ def agreements(found: Found, r: Refit) -> tuple[Agreement, ...]:
         return ()
     columns = [c for h in r.members for c in evidence.columns[evidence.asked.index(h)]]
     G, b, apart = _normal(found, r, columns)
-    keep = np.diag([(PRIOR_WIDTH * r.members[i].parameter(n).sigma) ** -2.0 for i, n in r.names])
+    keep = np.diag([(PRIOR_WIDTH * h.parameter(n).sigma) ** -2.0 for h, n in r.names])
     alone = np.array([np.linalg.solve(g + keep, x) for g, x in zip(G, b, strict=True)])
     # the car's drive-to-drive spread is added to the variance of a single drive's value
     sd = np.array([np.sqrt(np.diag(np.linalg.inv(g + keep)) + apart**2) for g in G])
     others = np.array([np.linalg.solve(G.sum(axis=0) - g + keep, b.sum(axis=0) - x) for g, x in zip(G, b, strict=True)])
     gains = [0.5 * (_loss(g, x, -r.off) - _loss(g, x, o)) for g, x, o in zip(G, b, others, strict=True)]
     out = []
-    for k, (i, name) in enumerate(r.names):
-        unit = r.members[i].parameter(name).unit
+    for k, (h, name) in enumerate(r.names):
+        unit = h.parameter(name).unit
         values = r.values[k] + alone[:, k]
         half = Z95 * sd[:, k]
-        each = [Estimate(float(v), float(v - h), float(v + h), unit) for v, h in zip(values, half, strict=True)]
+        each = [Estimate(float(v), float(v - x), float(v + x), unit) for v, x in zip(values, half, strict=True)]
         p = 10.0 ** -chi2_log_p(_heterogeneity(each), len(drives) - 1)
         of_drives = tuple(
             ByDrive(d.name, e, float(r.values[k] + o), float(gain))
             for d, e, o, gain in zip(drives, each, others[:, k], gains, strict=True)
         )
-        out.append(Agreement(r.members[i].key, name, of_drives, p))
+        out.append(Agreement(h.key, name, of_drives, p))
     return tuple(out)
 
 

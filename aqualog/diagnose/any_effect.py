@@ -14,7 +14,7 @@ from aqualog.diagnose.evidence import Evidence, tolerant
 from aqualog.diagnose.records import Significance
 
 __all__ = [
-    "ALIKE", "SURROGATES", "Calibration", "bonferroni", "calibrate", "chance", "gains_of", "gumbel_p", "significance",
+    "ALIKE", "SURROGATES", "Calibration", "calibrate", "chance", "gains_of", "gumbel_p", "significance",
 ]  # fmt: skip
 
 # draws of noise: on 200 made drives without effect of 40 s, the level 0.05 was passed by 0.115 with 19, 0.080 with 49
@@ -25,14 +25,11 @@ EULER = 0.5772156649015329
 
 
 class Calibration(NamedTuple):
-    """Null distribution: largest gains over their parameters, `maxima` (S,).
-
-    `achieved`: share of these maxima beyond the threshold; `tested`: hypotheses that differ from each other.
-    """
+    """Null distribution: largest gains over their parameters, `maxima` (S,); `tested`: hypotheses that differ from each
+    other."""
 
     maxima: FloatArray
     threshold: float
-    achieved: float
     tested: int
 
 
@@ -61,9 +58,10 @@ def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: 
     sizes = _sizes(evidence)
     groups = _groups(evidence, plain)
     leaders = sorted({g for g in groups.tolist() if not evidence.asked[g].allowed})
-    bound = bonferroni(level, len(leaders))
+    # of the largest of as many gains, each of one degree of freedom, whatever their dependence
+    bound = NormalDist().inv_cdf(1.0 - 0.5 * level / max(len(leaders), 1)) ** 2
     if surrogates == 0:
-        return Calibration(np.zeros(0), bound, level, len(leaders))
+        return Calibration(np.zeros(0), bound, len(leaders))
     inner = plain[:-1, :-1]
     # columns of very different units: in one scale, or rounding alone would give the small ones their gains
     scale = np.sqrt(np.diag(inner)) + 1e-30
@@ -77,7 +75,7 @@ def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: 
     # where tolerances are larger than the noise, noise alone gives almost no gain; the car's own deviations do
     mu, beta = _gumbel(maxima)
     threshold = max(mu - beta * math.log(-math.log1p(-level)), bound)
-    return Calibration(maxima, threshold, float((maxima > threshold).mean()), len(leaders))
+    return Calibration(maxima, threshold, len(leaders))
 
 
 def significance(evidence: Evidence, gram: FloatArray, c: Calibration, level: float) -> Significance:
@@ -85,17 +83,13 @@ def significance(evidence: Evidence, gram: FloatArray, c: Calibration, level: fl
     statistic = float((gains_of(evidence, gram) / _sizes(evidence)).max())
     bound = max(chance(statistic, c.tested), 1e-12)
     p = max(gumbel_p(c.maxima, statistic), bound) if c.maxima.size else bound
-    return Significance(statistic, c.threshold, p, level, c.achieved if c.maxima.size else math.nan, c.maxima.size)
+    achieved = float((c.maxima > c.threshold).mean()) if c.maxima.size else math.nan
+    return Significance(statistic, c.threshold, p, level, achieved, c.maxima.size)
 
 
 def chance(x: float, count: int) -> float:
     """Bound of the share of nulls whose largest of `count` gains, each of one degree of freedom, is beyond x."""
     return min(1.0, count * math.erfc(math.sqrt(0.5 * max(x, 0.0))))
-
-
-def bonferroni(level: float, count: int) -> float:
-    """Threshold of the largest of `count` gains, each of one degree of freedom, whatever their dependence."""
-    return NormalDist().inv_cdf(1.0 - 0.5 * level / max(count, 1)) ** 2
 
 
 def _sizes(evidence: Evidence) -> FloatArray:

@@ -82,11 +82,6 @@ class Arena(Field):
     rows: tuple[slice, ...]
     tolerance: FloatArray
 
-    @property
-    def width(self) -> int:
-        """Columns."""
-        return self.sd.size
-
     def drawn(self, part: int, block: Block) -> FloatArray:
         """Scaled columns (k, C, n) of a block along a part."""
         p, c = self.parts[part], list(block.columns)
@@ -103,7 +98,7 @@ class Arena(Field):
 
     def white(self) -> FloatArray:
         """The same under white noise of the size of the residuals' steps."""
-        total = np.zeros((self.width + 1, self.width + 1))
+        total = np.zeros((self.sd.size + 1, self.sd.size + 1))
         for i, p in enumerate(self.parts):
             noise = white_noise(p.residual, p.mask, contrasts(p.channels))
             used = np.asarray((noise.weights > 0.0).any(axis=0))
@@ -116,7 +111,7 @@ class Arena(Field):
 
     def _inner(self, part: int, width: int, turned: Callable[[FloatArray], FloatArray]) -> FloatArray:
         p, k = self.parts[part], self.evidence.count
-        rows = np.empty((self.width + 1, width), dtype=np.float32)
+        rows = np.empty((self.sd.size + 1, width), dtype=np.float32)
         rows[:k] = turned(p.signatures)
         rows[:k] *= self.sd[:k, None].astype(np.float32)
         for b in self.blocks:
@@ -169,13 +164,10 @@ def make_arena(evidence: Evidence, model: Model) -> Arena:
 
     Shapes of time and place take part on a single drive only: another drive has other ones.
     """
-    forces = []
-    for d, r in zip(evidence.drives, evidence.residuals, strict=True):
-        try:
-            forces.append(unit_force(d, model, r))
-        except ConfigError:
-            forces = []
-            break
+    try:
+        forces = [unit_force(d, model, r) for d, r in zip(evidence.drives, evidence.residuals, strict=True)]
+    except ConfigError:
+        forces = []
     return arena_of(evidence, forces)
 
 

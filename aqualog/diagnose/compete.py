@@ -116,7 +116,7 @@ def begin(arena: Arena) -> Begun:
     P = arena.tolerance[np.ix_(k, k)]
     root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
     w, V = np.linalg.eigh(root.T @ white[np.ix_(k, k)] @ root)
-    values = np.zeros((int((w > NEGLIGIBLE).sum()), arena.width))
+    values = np.zeros((int((w > NEGLIGIBLE).sum()), arena.sd.size))
     values[:, k] = (root @ V[:, w > NEGLIGIBLE]).T
     columns = tuple(arena.made(i, values).astype(np.float32) for i in range(len(arena.parts)))
     return Begun(arena, columns, arena.tolerant(white), {})
@@ -133,7 +133,7 @@ def _beside(begun: Begun, members: Members, fit: Fitted | None) -> _Noise:
         left = [p.residual[None] for p in arena.parts]
     else:
         z = np.random.default_rng(SEED).standard_normal((PAIRS, len(fit.mean))) @ np.linalg.cholesky(fit.covariance).T
-        values = np.zeros((2 * PAIRS, arena.width))
+        values = np.zeros((2 * PAIRS, arena.sd.size))
         values[:, fit.columns] = fit.mean + np.concatenate([z, -z])
         left = [p.residual - arena.made(i, values) for i, p in enumerate(arena.parts)]
     weighings = arena.weighed(left)

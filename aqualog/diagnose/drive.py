@@ -184,7 +184,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         notes.append("no brakes in the log: only driving and rolling out are used")
     elif torqued and "brake_pressure" not in filled:
         unlogged = "" if every_wheel else "the torque is that of one axle"
-        wet = _widened(floats | _on_water(course), BESIDE_S, dt)
+        wet = _widened(floats | (_depth(course) > 0.0), BESIDE_S, dt)
         if every_wheel and brakes_unlogged(torque, v, wet, vehicle, dt):
             unlogged = "the car slows down more than its torque explains"
         if unlogged:
@@ -287,14 +287,10 @@ def _bridged(x: FloatArray, dt: float, gaps: BoolArray) -> FloatArray:
 def _lanes(columns: Mapping[str, FloatArray], dt: float) -> tuple[Lane, ...]:
     """Stretches of water by their labels: each stretch with its mean depths."""
     both = columns.get("water_depth")
-    left = columns.get("water_depth_left", both)
-    right = columns.get("water_depth_right", both)
-    if left is None and right is None:
+    told = [x for n in ("left", "right") if (x := columns.get(f"water_depth_{n}", both)) is not None]
+    if not told:
         return ()
-    left = right if left is None else left
-    right = left if right is None else right
-    assert left is not None
-    assert right is not None
+    left, right = told[0], told[-1]
     wet: BoolArray = np.maximum(left, right) > 1e-5
     # each step of a depth that is logged in steps makes a stretch
     change = np.flatnonzero(
@@ -318,10 +314,11 @@ def _lanes(columns: Mapping[str, FloatArray], dt: float) -> tuple[Lane, ...]:
     )
 
 
-def _on_water(course: Course) -> BoolArray:
-    out: BoolArray = np.zeros(course.t.shape, dtype=bool)
+def _depth(course: Course) -> FloatArray:
+    """Mean depth of the water under both sides, 0 on dry road. (n,) [m]"""
+    out = np.zeros_like(course.t)
     for lane in course.lanes:
-        out |= (course.t >= lane.start) & (course.t < lane.end)
+        out[(course.t >= lane.start) & (course.t < lane.end)] = 0.5 * (lane.depth_left + lane.depth_right)
     return out
 
 
@@ -352,10 +349,7 @@ def _coordinates(
         "a_x": np.gradient(smooth(v, dt, SPEED_S), dt),
     }
     if course.lanes:
-        depth = np.zeros_like(v)
-        for lane in course.lanes:
-            depth[(course.t >= lane.start) & (course.t < lane.end)] = 0.5 * (lane.depth_left + lane.depth_right)
-        out["water_depth"] = depth
+        out["water_depth"] = _depth(course)
     if "yaw_rate" in columns:
         turning = smooth(columns["yaw_rate"], dt, SPEED_S)
         out |= {"a_y": speed * turning, "yaw_rate": turning}

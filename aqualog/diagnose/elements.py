@@ -88,7 +88,7 @@ def with_elements(arena: Arena) -> Arena:
 
 
 def _extended(arena: Arena, made: Sequence[tuple[Mechanism, _Found]]) -> Arena:
-    shapes, blocks, sd, n = list(arena.shapes), list(arena.blocks), [arena.sd], arena.width
+    shapes, blocks, sd, n = list(arena.shapes), list(arena.blocks), [arena.sd], arena.sd.size
     for m, f in made:
         each = sum(s.mechanism is m for s in arena.shapes)
         k = f.basis.columns.shape[1]
@@ -102,7 +102,7 @@ def _extended(arena: Arena, made: Sequence[tuple[Mechanism, _Found]]) -> Arena:
         sd.append(np.full(k, m.usual))
         n += k
     tolerance = np.zeros((n, n))
-    tolerance[: arena.width, : arena.width] = arena.tolerance
+    tolerance[: arena.sd.size, : arena.sd.size] = arena.tolerance
     return replace(
         arena, shapes=tuple(shapes), blocks=tuple(blocks), sd=np.concatenate(sd), tolerance=tolerance
     )  # fmt: skip

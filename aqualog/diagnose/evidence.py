@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import Drive
-from aqualog.diagnose.file_values import as_value, day_to_day, deviation, kind_of
+from aqualog.diagnose.file_values import as_value, day_to_day, deviation
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.spectrum import weighing
 from aqualog.model.term import Kind, Model
@@ -42,7 +42,7 @@ class Evidence:
     tolerance: FloatArray  # (K,) deviation of each parameter that is not worth naming
     barred: BoolArray  # (H,) hypotheses that contradict the drives: neither tested nor put into sets
     spread: FloatArray  # (K,) of the same car between drives, where measured, and of the file's own value
-    kinds: tuple[Kind, ...]  # (K,) the kind of day-to-day difference that each looks like
+    kinds: tuple[Kind, ...]  # (K,) the kind of day-to-day difference that each looks like, as mass and torque gain
     as_values: FloatArray  # (K,) size of that difference and of the file's errors, expressed as its value
 
     @property
@@ -61,9 +61,9 @@ def make_evidence(
     asked: Sequence[Hypothesis],
     residuals: Sequence[FloatArray],
     signatures: Sequence[Sequence[FloatArray]],
-    present_values: Mapping[tuple[int, str], float],
+    model: Model,
 ) -> Evidence:
-    """Columns of all hypotheses; `present_values` (hypothesis, parameter): values in the model at hand."""
+    """Columns of all hypotheses about the model at hand."""
     columns: list[tuple[int, ...]] = []
     variants = Counter((h.effect.name, h.where) for h in asked if not (h.allowed or h.effect.drive.begins_like))
     rows: list[tuple[float, ...]] = []
@@ -71,17 +71,17 @@ def make_evidence(
     # drag counts at this speed [m/s]: a head wind's v w is nearest to drag's v^2 by least squares there
     v, car = np.concatenate([d.coordinates["v_x"][d.mask] for d in drives]), drives[0].vehicle
     speed = float((v**3).sum() / max(float((v**2).sum()), 1e-9))
-    for i, h in enumerate(asked):
+    for h in asked:
         columns.append(tuple(range(len(rows), len(rows) + len(h.free))))
         # of one effect, which look much alike and together deviate by as much as one; moments do not
         shared = 1.0 / math.sqrt(max(variants[h.effect.name, h.where], 1))
         for name in h.free:
-            p, now = h.parameter(name), present_values[i, name]
+            p, now = h.parameter(name), value_in(model, h, name)
             spread = shared * math.hypot(day_to_day(h, name, car), deviation(h, name, car))
             tolerance = shared * h.tolerance(name)
             size, value = h.worth_naming(name), as_value(h, name, car, speed)
             rows.append((p.sigma, p.low - now, p.high - now, size, tolerance, spread, value))
-            kinds.append(kind_of(h, name))
+            kinds.append("" if p.day_to_day is None else p.day_to_day.kind)
     flat = tuple(np.concatenate(list(s)) for s in signatures)
     prior, low, high, smallest, allowed, off, values = np.ascontiguousarray(np.array(rows).T)
     return Evidence(

@@ -16,7 +16,7 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.full_rate import LEVEL, Kind, PerTurn, per_turn, wheel_columns
 from aqualog.diagnose.isolate import POWER
-from aqualog.diagnose.records import SURE, Cause, Estimate, Limit, Remainder, Verdict, tempered
+from aqualog.diagnose.records import SURE, Cause, Estimate, Limit, Remainder, tempered
 from aqualog.diagnose.seams import seams
 from aqualog.diagnose.search import DOUBT, Option
 from aqualog.diagnose.spline import POINTS
@@ -72,11 +72,9 @@ def faster(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, model: Model
 
 def joined(outcome: Outcome[Option], seen: Faster) -> Outcome[Option]:
     """The outcome with the causes beside its own: they act on no residual of the search, so neither hides the other."""
-    verdict: Verdict = outcome.verdict
-    causes = (*outcome.causes, *seen.causes)
-    if verdict in ("no_effect", "named", "compound") and (causes or seen.forms):
-        verdict = "unexplained" if seen.forms else "named" if len(causes) == 1 else "compound"
-    return outcome._replace(verdict=verdict, causes=causes, certain=outcome.certain | {c.effect for c in seen.causes})
+    is_form = bool(seen.forms) and outcome.verdict in ("no_effect", "named", "compound")
+    outcome = outcome.beside(*seen.causes)
+    return outcome._replace(verdict="unexplained") if is_form else outcome
 
 
 def with_rings(model: Model, seen: Faster) -> Model:

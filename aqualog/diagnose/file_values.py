@@ -13,10 +13,10 @@ from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.words import listed
 from aqualog.model.effects import EFFECTS
-from aqualog.model.term import Kind, Model, Term
+from aqualog.model.term import Model, Term
 
 __all__ = [
-    "as_value", "calibrated_enough", "day_to_day", "deviation", "key_of", "kind_of", "not_calibrated", "own_sd",
+    "as_value", "calibrated_enough", "day_to_day", "deviation", "key_of", "not_calibrated", "own_sd",
     "with_known",
 ]  # fmt: skip
 
@@ -109,16 +109,6 @@ def day_to_day(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
     sd = vehicle.spread.get(row.key, 0.0)
     # the effect's gain is on top of the file's
     return sd / vehicle.torque_gain if row.key == "torque_gain" else sd
-
-
-def kind_of(h: Hypothesis, name: str) -> Kind:
-    """The kind of day-to-day difference that a parameter looks like, or an empty string.
-
-    The force balance cannot separate mass from the torque's gain, drag area from the day's wind, or rolling resistance
-    from drag.
-    """
-    row = h.parameter(name).day_to_day
-    return "" if row is None else row.kind
 
 
 def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:

@@ -19,7 +19,17 @@ from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import STEP_S, Led, led_along, shown
 from aqualog.model.term import Effect, Model, Need, Parameter, Term
 
-__all__ = ["WORTH", "Hypothesis", "hypotheses", "residual", "signatures", "simulated", "value_in", "with_values"]
+__all__ = [
+    "WORTH",
+    "Hypothesis",
+    "hypotheses",
+    "residual",
+    "signatures",
+    "simulated",
+    "value_in",
+    "with_free",
+    "with_values",
+]
 
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
 WORTH = 2.0  # tolerances
@@ -188,6 +198,12 @@ def with_values(model: Model, found: Sequence[tuple[Hypothesis, Mapping[str, flo
     return Model(tuple(terms))
 
 
+def with_free(model: Model, members: Sequence[Hypothesis], values: FloatArray) -> Model:
+    """The same with the values (k,) of all free parameters, one after the other."""
+    left = iter(values.tolist())
+    return with_values(model, [(h, {n: next(left) for n in h.free}) for h in members])
+
+
 def value_in(model: Model, h: Hypothesis, name: str) -> float:
     """Value of a parameter in a model; neutral if it has no such term."""
     for t in model.terms:
@@ -264,23 +280,21 @@ def signatures(
         tick()
         return np.array(out)
 
-    alone = {i: h for i, h in enumerate(asked) if h.lane is None and (each or not h.parts)}
-    done = dict(zip(alone, beside(one, alone.values()), strict=True))
-    by_wheel: dict[tuple[str, str | None, tuple[tuple[str, float], ...]], FloatArray] = {
-        (asked[i].effect.name, asked[i].where, tuple(asked[i].fixed.items())): x for i, x in done.items()
+    alone = {
+        (h.effect.name, h.where, tuple(h.fixed.items())): h for h in asked if h.lane is None and (each or not h.parts)
     }
     sources = {e.name: at for at, e in LANE_TOLERANCES.items()}
     for name, where in {sources[h.effect.name] for h in asked if h.lane is not None}:
-        if (name, where, ()) not in by_wheel:
-            by_wheel[name, where, ()] = one(Hypothesis(EFFECTS[name], where, (EFFECTS[name].parameters[0].name,)))
+        source = Hypothesis(EFFECTS[name], where, (EFFECTS[name].parameters[0].name,))
+        alone.setdefault((name, where, ()), source)
+    done = dict(zip(alone, beside(one, alone.values()), strict=True))
     number = stretches(drive)
 
-    def of(i: int, h: Hypothesis) -> FloatArray:
-        if i in done:
-            return done[i]
-        if h.lane is None:
-            return np.asarray(np.sum([by_wheel[h.effect.name, w, tuple(h.fixed.items())] for w in h.parts], axis=0))
-        there = (number > 0) & ((number - 1) % MOST_LANES == h.lane)
-        return np.asarray(by_wheel[*sources[h.effect.name], ()][:1] * there)
+    def of(h: Hypothesis) -> FloatArray:
+        if h.lane is not None:
+            there = (number > 0) & ((number - 1) % MOST_LANES == h.lane)
+            return np.asarray(done[*sources[h.effect.name], ()][:1] * there)
+        places = (h.where,) if each or not h.parts else h.parts
+        return np.asarray(np.sum([done[h.effect.name, w, tuple(h.fixed.items())] for w in places], axis=0))
 
-    return [of(i, h) for i, h in enumerate(asked)]
+    return [of(h) for h in asked]

@@ -11,16 +11,15 @@ import numpy as np
 from aqualog.core.intervals import Z95
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
-from aqualog.diagnose.compete import Members, Posterior
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.noise import Noise, bridged, whitened
 from aqualog.diagnose.records import SURE, Cause, Estimate, tempered
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import DOUBT, Found, Option, sharpened
-from aqualog.diagnose.sets import fitted_in
+from aqualog.diagnose.sets import Members, fitted_in
 from aqualog.diagnose.threads import beside
-from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, Outcome, candidates, decided, whole
+from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, Causes, Outcome, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence, name_of
 from aqualog.model.term import Model
 
@@ -41,7 +40,7 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
     that is not named and leaves the channels larger than it finds them is noise.
     """
     if found.forms:
-        linear = _linear(found.arena, found.posterior, found.posterior.best, model)
+        linear = _linear(found, found.posterior.best, model)
         share = {n: tempered(p) for n, p in found.posterior.marginal.items()}
         causes = (replace(c, probability=share.get(c.effect, 0.0)) for c, large in linear if large)
         beside = tuple(c for c in causes if c.probability >= SURE)
@@ -54,10 +53,8 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
         # a member that is too small to be worth naming is not named: its sign says nothing against the others
         return repeats(chosen, found.arena, noises, {c.key for c in best.large})
 
-    def causes_of(o: Option) -> tuple[tuple[Cause, bool], ...]:
-        if o.refit is not None:
-            return tuple(_refitted(found, o.refit))
-        return tuple(_linear(found.arena, found.posterior, o.members, model))
+    def causes_of(o: Option) -> Causes:
+        return _linear(found, o.members, model) if o.refit is None else _refitted(found, o.refit)
 
     sets = candidates([(o, o.evidence) for o in found.options], causes_of)
     d = decided(sets, lambda group: _at_place(found, group, model), failing)
@@ -79,7 +76,7 @@ def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) ->
 
     def sharper(s: Candidate[Option]) -> Candidate[Option]:
         refit, loss = sharpened(found, s.option, model)
-        causes = tuple(_refitted(found, refit)) if refit is not None else s.causes
+        causes = _refitted(found, refit) if refit is not None else s.causes
         kept = replace(s, option=replace(s.option, refit=refit), causes=causes, sharp=loss)
         # with fewer tolerances a value may fall below what is worth naming
         return kept if kept.names == s.names else replace(s, sharp=loss)
@@ -90,23 +87,23 @@ def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) ->
     return max(as_good, key=lambda s: (whole(s), s.share))
 
 
-def _refitted(found: Found, r: Refit) -> list[tuple[Cause, bool]]:
+def _refitted(found: Found, r: Refit) -> Causes:
     """The members of a refitted set with values, intervals and sentences, and whether each is worth naming."""
     sd = np.sqrt(np.diag(r.covariance))
     out = []
-    for i, h in enumerate(r.members):
-        k = [k for k, (owner, _) in enumerate(r.names) if owner == i]
-        made = [np.tensordot(r.off[k], s[k], axes=1) for s in r.signatures]
-        explains = _explains(found.arena, [x + m for x, m in zip(r.residuals, made, strict=True)], r.residuals)
+    for h in r.members:
+        k = [k for k, (owner, _) in enumerate(r.names) if owner is h]
+        explains = _explains(found.arena, [r.before(d, k) for d in range(len(r.residuals))], r.residuals)
         out.append(_cause(h, r.values[k], r.off[k], sd[k], explains))
-    return out
+    return tuple(out)
 
 
-def _linear(arena: Arena, posterior: Posterior, members: Members, model: Model) -> list[tuple[Cause, bool]]:
+def _linear(found: Found, members: Members, model: Model) -> Causes:
     """The known effects of a set with their values in the competition, and whether each is worth naming."""
     if not members:
-        return []
-    fit = fitted_in(arena.blocks, posterior.tolerant, members)
+        return ()
+    arena = found.arena
+    fit = fitted_in(arena.blocks, found.posterior.tolerant, members)
     sd = np.sqrt(np.diag(fit.covariance)) * arena.sd[fit.columns]
     mean = fit.mean * arena.sd[fit.columns]
     out = []
@@ -119,7 +116,7 @@ def _linear(arena: Arena, posterior: Posterior, members: Members, model: Model) 
         before = arena.evidence.residuals
         explains = _explains(arena, before, [x - m for x, m in zip(before, made, strict=True)])
         out.append(_cause(h, now + mean[k], mean[k], sd[k], explains))
-    return out
+    return tuple(out)
 
 
 def _cause(
@@ -146,7 +143,7 @@ def _is_gain(found: Found, r: Refit | None) -> bool:
     """Whether a refitted set makes the channels' rms smaller on the whole; one that is not refitted may."""
     if r is None:
         return True
-    before = [x + np.tensordot(r.off, s, axes=1) for x, s in zip(r.residuals, r.signatures, strict=True)]
+    before = [r.before(d) for d in range(len(r.residuals))]
     return bool(_falls(found.arena, before, r.residuals).sum() > 0.0)
 
 
@@ -188,16 +185,19 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
     """
     off = refit.off
     G, b = _by_third(refit, arena, noises)
-    prior = np.diag(np.array([refit.members[i].parameter(n).sigma for i, n in refit.names]) ** -2.0)
+    prior = np.diag(np.array([h.parameter(n).sigma for h, n in refit.names]) ** -2.0)
     out = []
     total = 0.0
     for t in range(THIRDS):
         own = np.linalg.inv(G[t] + prior)
         alone, sd = own @ b[t], np.sqrt(np.diag(own))
-        for k, (i, _) in enumerate(refit.names):
-            is_named = refit.members[i].key in names
-            if is_named and abs(off[k]) > SEEN * sd[k] and alone[k] * off[k] < 0.0 and abs(alone[k]) > SEEN * sd[k]:
-                h = refit.members[i]
+        for k, (h, _) in enumerate(refit.names):
+            if (
+                h.key in names
+                and abs(off[k]) > SEEN * sd[k]
+                and alone[k] * off[k] < 0.0
+                and abs(alone[k]) > SEEN * sd[k]
+            ):
                 out.append(f"{name_of(h.effect.name, h.where)} has the other sign in {_ORDINAL[t]} third of the drive.")
         rest = [o for o in range(THIRDS) if o != t]
         others = np.linalg.solve(sum(G[o] for o in rest) + prior, sum(b[o] for o in rest))
@@ -205,7 +205,7 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
     if total <= 0.0:
         every = ", ".join(name_of(h.effect.name, h.where) for h in refit.members)
         out.append(f"{every}: two thirds of the drive do not predict the other third better with it.")
-    if any(at and refit.members[i].key in names for (i, _), at in zip(refit.names, refit.bounded, strict=True)):
+    if any(at and h.key in names for (h, _), at in zip(refit.names, refit.bounded, strict=True)):
         out.append("a value stands at its physical bound.")
     return tuple(out)
 
@@ -217,10 +217,8 @@ def _by_third(
     k = len(refit.off)
     G, b = [np.zeros((k, k)) for _ in range(THIRDS)], [np.zeros(k) for _ in range(THIRDS)]
     for part, noise in zip(arena.parts, noises, strict=True):
-        own, after = refit.signatures[part.drive][..., part.at], refit.residuals[part.drive][:, part.at]
-        before = after + np.tensordot(refit.off, own, axes=1)
-        rows = whitened(bridged(np.concatenate([own, before[None]]), part.mask), noise)
-        rows = rows.reshape(k + 1, *after.shape)
+        own = np.concatenate([refit.signatures[part.drive], refit.before(part.drive)[None]])[..., part.at]
+        rows = whitened(bridged(own, part.mask), noise).reshape(own.shape)
         third = np.minimum(THIRDS * np.cumsum(part.mask) // max(int(part.mask.sum()), 1), THIRDS - 1)
         for t in range(THIRDS):
             x = rows[..., third == t].reshape(k + 1, -1)

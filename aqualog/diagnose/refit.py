@@ -13,7 +13,7 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import CHUNK, Arena, Part, products
 from aqualog.diagnose.evidence import FARTHEST, Evidence
-from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
+from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_free, with_values
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.model.term import Model
 
@@ -37,7 +37,6 @@ class Refit:
     """
 
     members: tuple[Hypothesis, ...]
-    names: tuple[tuple[int, str], ...]
     values: FloatArray
     off: FloatArray
     covariance: FloatArray
@@ -46,6 +45,16 @@ class Refit:
     residuals: tuple[FloatArray, ...]
     signatures: tuple[FloatArray, ...]
     bounded: tuple[bool, ...]
+
+    @property
+    def names(self) -> tuple[tuple[Hypothesis, str], ...]:
+        """Effect and parameter of each value."""
+        return tuple((h, n) for h in self.members for n in h.free)
+
+    def before(self, drive: int, own: Sequence[int] | slice = slice(None)) -> FloatArray:
+        """Residual (C, n) of a drive that a linear model about these values has without them, or some of them."""
+        made = np.tensordot(self.off[own], self.signatures[drive][own], axes=1)
+        return np.asarray(self.residuals[drive] + made)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,10 +156,8 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
     """
 
     def tried_at(values: FloatArray) -> tuple[FloatArray, list[FloatArray], Model] | None:
-        own = list(zip(names, values.tolist(), strict=True))
-        by_member = [(h, {n: v for (o, n), v in own if o == i}) for i, h in enumerate(members)]
         try:
-            extended = with_values(model, by_member)
+            extended = with_free(model, members, values)
             residuals = [residual(d, extended) for d in evidence.drives]
         except ConfigError:
             return None
@@ -164,9 +171,8 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
         return tuple(np.concatenate(signatures(d, extended, members, base=r, each=True)) for d, r in own)
 
     members = tuple(evidence.asked[m] for m in chosen)
-    names = tuple((i, n) for i, h in enumerate(members) for n in h.free)
     columns = [c for m in chosen for c in evidence.columns[m]]
-    base = np.array([value_in(model, members[i], n) for i, n in names])
+    base = np.array([value_in(model, h, n) for h in members for n in h.free])
     low, high = base + evidence.low[columns], base + evidence.high[columns]
     width = PRIOR_WIDTH * evidence.prior[columns]
     J = measure.rows([s[columns] for s in evidence.signatures])  # (k, N): change of the residual by one unit
@@ -214,4 +220,4 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
     bounded = tuple(bool(x) for x in (values <= low + 1e-12) | (values >= high - 1e-12))
     off = values - base
     loss -= float(((off / width) ** 2).sum())
-    return Refit(members, names, values, off, np.asarray(covariance), loss, extended, tuple(residuals), here, bounded)
+    return Refit(members, values, off, np.asarray(covariance), loss, extended, tuple(residuals), here, bounded)

@@ -31,7 +31,7 @@ from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
 from aqualog.diagnose.outcome import conclude, with_causes
-from aqualog.diagnose.records import SURE, Consequence, Diagnosis, Gain, Remainder, ResidualView, Verdict
+from aqualog.diagnose.records import SURE, Consequence, Diagnosis, Gain, Remainder, ResidualView
 from aqualog.diagnose.refit import Refit, likeliest, metric
 from aqualog.diagnose.run_information import Rival
 from aqualog.diagnose.search import Found, Option, Tell, search, simulated
@@ -252,25 +252,21 @@ def _led(drive: Drive, model: Model) -> FloatArray:
 
 
 def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
-    cause, own = road.cause, outcome.causes
+    cause = road.cause
     if road.rms.value < HILLY or cause.probability < SURE:
-        small, unsure = (
-            "Significant, but too small to be worth naming",
-            f"Probability {cause.probability:.2f}, not named",
-        )
-        why = small if cause.probability >= SURE else unsure
+        why = "Significant, but too small to be worth naming"
+        if cause.probability < SURE:
+            why = f"Probability {cause.probability:.2f}, not named"
         return outcome._replace(notes=(*outcome.notes, f"{why}: {cause.sentence}"))
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
         # one road: a constant slope is its mean, whose interval knows that it is an offset as well
-        own = tuple(c for c in own if c.effect != cause.effect)
+        outcome = outcome._replace(causes=tuple(c for c in outcome.causes if c.effect != cause.effect))
     is_sure = outcome.verdict != "cannot_tell" or "accelerometer_bias" in outcome.certain
-    if is_sure and any(c.effect == "accelerometer_bias" for c in own):  # it has the constant that a mean would repeat
+    if is_sure and any(
+        c.effect == "accelerometer_bias" for c in outcome.causes
+    ):  # it has the constant that a mean would repeat
         cause = replace(cause, parameters={n: e for n, e in cause.parameters.items() if n != "grade_mean"})
-    verdict: Verdict = outcome.verdict
-    if verdict in ("no_effect", "named", "compound"):
-        verdict = "compound" if own else "named"
-    certain = outcome.certain | {cause.effect}
-    return outcome._replace(verdict=verdict, causes=(*own, cause), certain=certain)
+    return outcome.beside(cause)
 
 
 def _extended(

@@ -124,7 +124,7 @@ def forecast(case: Case, log: FloatArray, run: FloatArray, times: int, group: Fl
     for i, c in enumerate(case.rivals):
         own = [*range(first, first + len(c.refit.names)), *range(len(log) - len(case.tolerances), len(log))]
         first += len(c.refit.names)
-        sd = [PRIOR_WIDTH * c.refit.members[m].parameter(n).sigma for m, n in c.refit.names] + wide
+        sd = [PRIOR_WIDTH * h.parameter(n).sigma for h, n in c.refit.names] + wide
         spread = np.linalg.inv(log[np.ix_(own, own)] + np.diag(np.array(sd) ** -2.0))
         mean = spread @ log[own, i]
         fresh = len(own) - len(anew) + np.flatnonzero(anew)
@@ -227,8 +227,8 @@ def of_check(case: Case, check: Check) -> FloatArray:
             return 0.0
         return 0.25 if h.where in WHEELS else 0.5 if h.where in AXLES else 1.0
 
-    sets = [[(h, n, value_in(c.refit.model, h, n)) for h in c.refit.members for n in h.free] for c in case.rivals]
+    sets = [[(h, n, value_in(c.refit.model, h, n)) for h, n in c.refit.names] for c in case.rivals]
     left = [-sum(share(h, n) * (x - h.parameter(n).neutral) for h, n, x in own) for own in sets]
-    own = [share(c.refit.members[i], n) for c in case.rivals for i, n in c.refit.names]
+    own = [share(h, n) for c in case.rivals for h, n in c.refit.names]
     row = np.array([*left, *own, *(share(h, n) for _, h, n, _ in case.tolerances)]) / check.sd
     return np.outer(row, row)

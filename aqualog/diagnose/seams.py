@@ -68,13 +68,6 @@ class _Delays(NamedTuple):
     least: float = LEAST_S
 
 
-class _Step(NamedTuple):
-    pair: tuple[str, str]
-    t: float
-    size: float
-    p: float
-
-
 def seams(signals: Signals, vehicle: Vehicle, *, seed: int = 1) -> tuple[Seam, ...]:
     """Jumps of the clock of accelerometer, wheels, reference velocity or torque, first ones first.
 
@@ -84,7 +77,7 @@ def seams(signals: Signals, vehicle: Vehicle, *, seed: int = 1) -> tuple[Seam, .
     """
     sources = _sources(signals, vehicle)
     pairs = list(combinations(sources, 2))
-    steps: list[_Step] = []
+    steps: list[Seam] = []
     for i, (a, b) in enumerate(pairs):
         delays = _delays(sources[a], sources[b], max(1, round(STEP_S / signals.dt)) * signals.dt)
         if delays is not None:
@@ -181,7 +174,7 @@ def _products(
     return xy, square[starts + size] - square[starts], (own**2).sum(axis=1)
 
 
-def _steps(pair: tuple[str, str], d: _Delays, tests: int, rng: np.random.Generator, depth: int = 0) -> list[_Step]:
+def _steps(pair: tuple[str, str], d: _Delays, tests: int, rng: np.random.Generator, depth: int = 0) -> list[Seam]:
     """Steps of the delay of one pair: the surest, then those before and after it."""
     if d.t.size < LEAST_WINDOWS or depth > 2:
         return []
@@ -198,7 +191,7 @@ def _steps(pair: tuple[str, str], d: _Delays, tests: int, rng: np.random.Generat
     size = float(np.median(d.delay[k:]) - np.median(d.delay[:k]))
     if p > SEAM_LEVEL or abs(size) < d.least:
         return []
-    found = [_Step(pair, 0.5 * float(d.t[k - 1] + d.t[k]), size, p)]
+    found = [Seam(0.5 * float(d.t[k - 1] + d.t[k]), size, pair, p)]
     for part in (slice(0, k), slice(k, None)):
         half = d._replace(t=d.t[part], delay=d.delay[part], weight=d.weight[part])
         found += _steps(pair, half, tests, rng, depth + 1)
@@ -224,19 +217,19 @@ def _scan(d: _Delays, delays: FloatArray) -> tuple[FloatArray, FloatArray]:
     return gain / left * (t.size - 4), along / energy
 
 
-def _named(steps: Sequence[_Step], sources: Sequence[str]) -> list[Seam]:
+def _named(steps: Sequence[Seam], sources: Sequence[str]) -> list[Seam]:
     """Steps of pairs as jumps of sources: the source that is in most of the pairs that step at one time."""
     out = []
-    left = sorted(steps, key=lambda s: s.p)
+    left = sorted(steps, key=lambda s: s.p_value)
     while left:
         surest = left[0]
-        group = [s for s in left if abs(s.t - surest.t) <= NEAR_S and set(s.pair) & set(surest.pair)]
-        score = {s: sum(s in step.pair for step in group) for s in sources}
+        group = [s for s in left if abs(s.t - surest.t) <= NEAR_S and set(s.signals) & set(surest.signals)]
+        score = {s: sum(s in step.signals for step in group) for s in sources}
         names = tuple(s for s in sources if score[s] == max(score.values()))
         if len(names) > 1:
-            names, group = surest.pair, [surest]
-        own = [s for s in group if names[0] in s.pair]
-        size = float(np.median([s.size * (1.0 if s.pair[0] == names[0] else -1.0) for s in own]))
-        out.append(Seam(float(np.median([s.t for s in own])), size, names, surest.p))
+            names, group = surest.signals, [surest]
+        own = [s for s in group if names[0] in s.signals]
+        size = float(np.median([s.size * (1.0 if s.signals[0] == names[0] else -1.0) for s in own]))
+        out.append(Seam(float(np.median([s.t for s in own])), size, names, surest.p_value))
         left = [s for s in left if s not in group]
     return out

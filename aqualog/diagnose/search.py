@@ -24,7 +24,7 @@ from aqualog.diagnose.competition import COARSE, joined, placed
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import with_elements
 from aqualog.diagnose.evidence import Evidence, forgiving, make_evidence, tolerant
-from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
+from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_free
 from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
@@ -99,8 +99,7 @@ def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model
         begun = moments(drives[0], residuals[0], asked, all_signatures[0])
         all_signatures[0] += signatures(drives[0], model, begun, base=residuals[0])
         asked = (*asked, *begun)
-    values = {(i, n): value_in(model, h, n) for i, h in enumerate(asked) for n in h.free}
-    return make_evidence(drives, asked, residuals, all_signatures, values)
+    return make_evidence(drives, asked, residuals, all_signatures, model)
 
 
 def search(
@@ -162,8 +161,7 @@ def _effects(arena: Arena, members: Members) -> list[int]:
 def _start(arena: Arena, posterior: Posterior, members: Members) -> FloatArray:
     """Linear values of a set's effects, as changes. (k,)"""
     fit = fitted_in(arena.blocks, posterior.tolerant, members)
-    columns = [c for m in members for c in arena.blocks[m].columns]
-    return np.asarray(fit.mean[[fit.columns.index(c) for c in columns]] * arena.sd[columns])
+    return np.asarray(fit.mean * arena.sd[fit.columns])
 
 
 def _repeated(arena: Arena, posterior: Posterior, model: Model) -> tuple[Arena, Posterior]:
@@ -191,12 +189,12 @@ def _led(arena: Arena, posterior: Posterior, model: Model) -> Evidence:
     """
     evidence, best = arena.evidence, _effects(arena, posterior.best)
     columns = [c for h in best for c in evidence.columns[h]]
-    start = _start(arena, posterior, posterior.best)
-    off = iter(np.clip(start, evidence.low[columns], evidence.high[columns]).tolist())
+    off = np.clip(_start(arena, posterior, posterior.best), evidence.low[columns], evidence.high[columns])
     own = [evidence.asked[i] for i in best]
-    found = [(h, {n: value_in(model, h, n) + next(off) for n in h.free}) for h in own]
+    values = np.array([value_in(model, h, n) for h in own for n in h.free]) + off
     try:
-        return replace(evidence, drives=tuple(led_by(d, with_values(model, found)) for d in evidence.drives))
+        found = with_free(model, own, values)
+        return replace(evidence, drives=tuple(led_by(d, found) for d in evidence.drives))
     except ConfigError:
         return evidence
 
@@ -210,11 +208,9 @@ def _around(arena: Arena, found: Refit, chosen: Sequence[int]) -> Arena:
     columns = [c for h in chosen for c in arena.evidence.columns[h]]
     parts = []
     for p in arena.parts:
-        own = found.signatures[p.drive][..., p.at]
         changed = p.signatures.copy()
-        changed[columns] = own
-        at_start = found.residuals[p.drive][:, p.at] + np.tensordot(found.off, own, axes=1)
-        parts.append(replace(p, signatures=changed, residual=at_start))
+        changed[columns] = found.signatures[p.drive][..., p.at]
+        parts.append(replace(p, signatures=changed, residual=found.before(p.drive)[:, p.at]))
     return replace(arena, parts=tuple(parts))
 
 
@@ -263,8 +259,8 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     within = {}  # the members of a refitted set that are not at a physical bound; all of them if each of them is
     for m, o in done.items():
         if o is not None and o.refit is not None:
-            at_bound = {i for (i, _), is_at in zip(o.refit.names, o.refit.bounded, strict=True) if is_at}
-            within[m] = tuple(b for i, b in enumerate(m) if i not in at_bound) or m
+            at_bound = [h for (h, _), is_at in zip(o.refit.names, o.refit.bounded, strict=True) if is_at]
+            within[m] = tuple(b for b in m if evidence.asked[arena.blocks[b].tag] not in at_bound) or m
     smaller = [m for m in dict.fromkeys(within.values()) if m not in done]
     done |= dict(zip(smaller, beside(one, smaller), strict=True))
     # water is not linear: without any effect, the simulator may differ from what signatures say of it
@@ -375,10 +371,9 @@ def _twins(evidence: Evidence, own: Sequence[int]) -> list[tuple[int, ...]]:
 
 def _plausible(r: Refit) -> bool:
     """Whether every value is worth naming and within three times its usual size: a huge offset is no likely rival."""
-    own = [(r.members[i], r.members[i].parameter(n), n) for i, n in r.names]
     return all(
-        abs(x) >= h.worth_naming(n) and abs(v - p.neutral) <= UNUSUAL * p.sigma
-        for (h, p, n), v, x in zip(own, r.values.tolist(), r.off.tolist(), strict=True)
+        abs(x) >= h.worth_naming(n) and abs(v - (p := h.parameter(n)).neutral) <= UNUSUAL * p.sigma
+        for (h, n), v, x in zip(r.names, r.values.tolist(), r.off.tolist(), strict=True)
     )
 
 

@@ -11,7 +11,7 @@ from aqualog.diagnose.records import SURE, Alternative, Cause, Verdict, tempered
 from aqualog.diagnose.sets import shares
 from aqualog.diagnose.threads import beside
 
-__all__ = ["CREDIBLE", "PLACES", "Candidate", "Outcome", "candidates", "decided", "whole"]
+__all__ = ["CREDIBLE", "PLACES", "Candidate", "Causes", "Outcome", "candidates", "decided", "whole"]
 
 CREDIBLE = 20.0  # evidence ratio within which places of one effect cannot be distinguished
 PLACES = 5.0  # evidence ratio within which the whole car is preferred to a part of it
@@ -56,6 +56,13 @@ class Outcome(NamedTuple, Generic[Option]):
     certain: frozenset[str] = frozenset()
     rivals: tuple[tuple[Candidate[Option], float], ...] = ()
     notes: tuple[str, ...] = ()
+
+    def beside(self, *sure: Cause) -> Outcome[Option]:
+        """The outcome with causes that are certain, whatever its own are."""
+        verdict, causes = self.verdict, (*self.causes, *sure)
+        if sure and verdict in ("no_effect", "named", "compound"):
+            verdict = "named" if len(causes) == 1 else "compound"
+        return self._replace(verdict=verdict, causes=causes, certain=self.certain | {c.effect for c in sure})
 
 
 def candidates(options: Sequence[tuple[Option, float]], causes: Callable[[Option], Causes]) -> list[Candidate[Option]]:

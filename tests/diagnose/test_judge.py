@@ -1,23 +1,22 @@
 """What speaks against a name, and probabilities."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.outcome import repeats
 from aqualog.diagnose.records import tempered
+from aqualog.diagnose.refit import Refit
+from aqualog.model.term import Model
 from tests.diagnose.test_unexplained import arena
 
 
 def speaking(a, value, before, names, *, at_bound=False):
     """What speaks against names of a set of one effect, fitted with this value to a residual."""
     own, h = a.evidence.signatures[0][:1], a.evidence.asked[0]
-    refit = SimpleNamespace(
-        members=(h,), names=((0, h.free[0]),), values=np.array([value]), off=np.array([value]), residuals=(before - value * own[0],),
-        signatures=(own,), bounded=(at_bound,),
-    )  # fmt: skip
+    left = (before - value * own[0],)
+    x = np.array([value])
+    refit = Refit((h,), x, x, np.eye(1), 0.0, Model(), left, (own,), (at_bound,))
     noises = [fit_noise(a.evidence.residuals[0], a.evidence.drives[0].mask, np.eye(1))]
     return repeats(refit, a, noises, names)
 

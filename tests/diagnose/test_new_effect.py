@@ -3,7 +3,6 @@
 import pytest
 
 from aqualog.book.reference.model import effects_page
-from aqualog.diagnose import file_values
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.manoeuvres import checks
@@ -32,7 +31,7 @@ def test_a_new_row_is_searched_for_with_its_own_facts():
     asked, _ = hypotheses([prepare(plain(), CAR, "a")], Model())
     h = next(h for h in asked if h.key == "open_window")
     assert (h.free, h.tolerance("area"), h.worth_naming("area")) == (("area",), 0.004, 0.01)
-    assert file_values.kind_of(h, "area") == "drag"
+    assert h.parameter("area").day_to_day.kind == "drag"
     assert [c.name for c in checks(frozenset({"open_window", "payload_mass"}))] == ["look", "weighing"]
 
 

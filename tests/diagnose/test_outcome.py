@@ -38,10 +38,9 @@ def option(evidence=SURE, sharp=0.0, signatures=S, model=Model(), **values):  # 
     index = [next(i for k, i in AT.items() if k.replace("@", "_") == name) for name in values]
     members = tuple(ASKED[i] for i in index)
     x = np.array(list(values.values()))
-    names = tuple((k, h.free[0]) for k, h in enumerate(members))
     off = x - [value_in(model, h, h.free[0]) for h in members]
     cov = np.diag((0.1 * off) ** 2)
-    r = Refit(members, names, x, off, cov, sharp, Model(), (LEFT,), (signatures[index],), (False,) * len(index))
+    r = Refit(members, x, off, cov, sharp, Model(), (LEFT,), (signatures[index],), (False,) * len(index))
     blocks = tuple(next(b for b, block in enumerate(ARENA.blocks) if block.tag == i) for i in index)
     return Option(blocks, evidence, r)
 

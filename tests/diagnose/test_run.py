@@ -79,7 +79,7 @@ def test_named_with_its_size_and_gain():
 def test_a_set_with_a_value_at_its_bound_counts_as_its_other_effects(monkeypatch):
     def at_bound(*args):
         r = own(*args)
-        return r and replace(r, bounded=tuple(r.members[i].effect.name == "tyre_radius" for i, _ in r.names))
+        return r and replace(r, bounded=tuple(h.effect.name == "tyre_radius" for h, _ in r.names))
 
     own = search.refit
     monkeypatch.setattr(search, "refit", at_bound)

@@ -14,6 +14,7 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.sets import fitted_in
 from aqualog.diagnose.subsets import compatible
 from aqualog.model.effects import EFFECTS
+from aqualog.model.term import Model
 
 CHANNELS = ("axle_slip", "lateral")
 KNOWN_CAR = Vehicle(given=frozenset(KEYS))  # its file sets every key
@@ -46,8 +47,7 @@ def bench_of(residual, signatures, asked=ASKED, mask=None):
         mask=mask, channels=CHANNELS[: len(residual)], vehicle=KNOWN_CAR, coordinates=own, dt=0.1, name="d",
         used_s=0.1 * mask.sum(),
     )  # fmt: skip
-    values = {(i, h.free[0]): h.parameter(h.free[0]).neutral for i, h in enumerate(asked)}
-    return make_evidence([drive], asked, [residual], [[s[None] for s in signatures]], values)
+    return make_evidence([drive], asked, [residual], [[s[None] for s in signatures]], Model())
 
 
 def waves(n, count, seed=0):

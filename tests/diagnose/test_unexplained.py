@@ -63,9 +63,8 @@ def arena(seed, force=None, **effects):
     drive = SimpleNamespace(
         mask=mask, channels=("force_balance",), vehicle=KNOWN_CAR, coordinates=own, dt=DT, used_s=0.1 * mask.sum()
     )
-    values = {(i, h.free[0]): h.parameter(h.free[0]).neutral for i, h in enumerate(ASKED)}
     signatures = [[made[h.effect.name][None, None] for h in ASKED]]
-    evidence = make_evidence([drive], ASKED, [y[None]], signatures, values)
+    evidence = make_evidence([drive], ASKED, [y[None]], signatures, Model())
     return arena_of(evidence, [np.full((1, N), -1.0 / MASS)])
 
 

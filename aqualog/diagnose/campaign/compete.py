@@ -20,6 +20,7 @@ from aqualog.diagnose.competition import COARSE, Block, joined, placed
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.records import Remainder, Significance
+from aqualog.diagnose.run import Options
 from aqualog.diagnose.sets import Members, Sets, fitted_in, ranked, searched
 from aqualog.diagnose.shapes import Mechanism, Shape
 from aqualog.diagnose.spline import basis
@@ -102,13 +103,12 @@ class _Stand:
 
 
 def compete(
-    passes: Passes, given: Model, asked: tuple[Hypothesis, ...], *, level: float, surrogates: int, seed: int,
-    say: Callable[[str], None] = lambda what: None,
-) -> Found:  # fmt: skip
+    passes: Passes, given: Model, asked: tuple[Hypothesis, ...], o: Options, say: Callable[[str], None]
+) -> Found:
     """Unknown forms and sets of known effects with their evidence.
 
     Signatures are straight lines, effects are not: so unknown forms compete with signatures about the best set of
-    effects, and effects are asked for only if the test for any effect finds more than chance at this `level`.
+    effects, and effects are asked for only if the test for any effect finds more than chance.
     """
     say("signatures of the effects")
     evidence = evidence_of(asked, given)
@@ -118,15 +118,15 @@ def compete(
     nothing = Refit((), np.zeros(0), given, y, np.zeros((*y.shape, 0)), at_bound=False)
     stand = _Stand.about(nothing, [], ring)
     plain = stand.gram(passes) / np.outer(scale := np.append(evidence.prior, 1.0), scale)
-    calibration = calibrate(evidence, plain, surrogates=surrogates, level=level, seed=seed)
-    test = significance(evidence, plain, calibration, level)
-    if test.p_value <= level:
+    calibration = calibrate(evidence, plain, surrogates=o.surrogates, level=o.level, seed=o.seed)
+    test = significance(evidence, plain, calibration, o.level)
+    if test.p_value <= o.level:
         say("known effects")
         stand = _repeated(ring, stand)
     say("known effects against unknown forms")
-    forms, stand = _forms(ring, stand, seed)
+    forms, stand = _forms(ring, stand, o.seed)
     options: tuple[Option, ...] = ()
-    if not forms and test.p_value <= level:
+    if not forms and test.p_value <= o.level:
         say("refitting the sets of effects")
         options = _options(ring, stand, nothing)
     return Found(evidence, test, plain, calibration, stand.scatter, nothing, forms, options)

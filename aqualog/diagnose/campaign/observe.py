@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.campaign.expect import S_MAX, Driven, respond
-from aqualog.diagnose.campaign.passes import CONTACT_MIN, LOST_MAX, RESISTANCE, Passes, Told, channels_of, question_of
+from aqualog.diagnose.campaign.passes import RESISTANCE, Passes, Told, floats, question_of
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.tyre import TYRES
@@ -29,19 +28,6 @@ THINNED = 3  # samples between evaluations of the model: slip and traction are m
 Index = NDArray[np.int64]
 
 
-class _Row(NamedTuple):
-    """`late`, `grown`: slip added by one second of delay of v_x [1/s] and by radii that grow by 1e-3 s²/m² v², each as
-    (on dry road, on water minus dry road).
-    """
-
-    info: RunInfo
-    told: Told
-    values: dict[str, float]
-    late: tuple[float, float]
-    grown: tuple[float, float]
-    seconds: float
-
-
 def passes_of(data: CampaignData) -> Passes:
     """Observations of all runs that are done and whose configuration the model knows.
 
@@ -49,7 +35,7 @@ def passes_of(data: CampaignData) -> Passes:
     loses nearly all of its contact. The measurement plays no part, so that noise does not influence the choice.
     """
     left_out: Counter[str] = Counter()
-    rows = []
+    rows: list[Told] = []
     for info in data.done:
         found = _row(data, info)
         if isinstance(found, str):
@@ -57,17 +43,15 @@ def passes_of(data: CampaignData) -> Passes:
         else:
             rows.append(found)
     wheels = [w for w in WHEELS if any(w in r.info.vehicle.driven for r in rows)]
-    names = channels_of(wheels)
+    names = (*(f"slip_slope_{w}" for w in wheels), *(f"dry_{w}" for w in wheels), RESISTANCE)
     values = np.array([[r.values.get(n, np.nan) for n in names] for r in rows]).reshape(len(rows), len(names))
-    infos = tuple(r.info for r in rows)
-    told = tuple(r.told for r in rows)
     return Passes(
-        names, values, told, infos, _coordinates(rows), _nuisances(rows, names),
-        np.array([r.seconds for r in rows]), dict(left_out), question_of(told),
+        names, values, tuple(rows), _coordinates(rows), _nuisances(rows, names), np.array([r.seconds for r in rows]),
+        dict(left_out), question_of(rows),
     )  # fmt: skip
 
 
-def _row(data: CampaignData, info: RunInfo) -> _Row | str:
+def _row(data: CampaignData, info: RunInfo) -> Told | str:
     scenario = _scenario(data, info)
     if isinstance(scenario, str):
         return scenario
@@ -84,13 +68,12 @@ def _row(data: CampaignData, info: RunInfo) -> _Row | str:
     if dry.size < least:
         return f"less than {LEAST_S:g} s of dry driving"
     values = {f"dry_{w}": float(np.mean(slip[dry])) for w, (slip, _) in columns.items()}
-    told = Told(scenario, _driven(samples, car, dry))
+    asked = None
     if scenario.lanes and wet.size >= least:
         asked = _driven(samples, car, wet)
-        expected = respond([assemble(scenario)], np.zeros(asked.v.size, int), np.ones(asked.v.size, bool), asked)
-        if expected.lost.max(axis=0).mean() > LOST_MAX or expected.contact.min(axis=0).mean() < CONTACT_MIN:
+        every = np.ones(asked.v.size, dtype=np.bool_)
+        if floats(respond([assemble(scenario)], np.zeros(every.size, int), every, asked), every):
             return "the model lets a wheel float nearly or fully: no steady slip"
-        told = told._replace(wet=asked)
         values |= {f"slip_slope_{w}": float(np.mean(s[wet])) - values[f"dry_{w}"] for w, (s, _) in columns.items()}
         delta = samples.array("delta_a_x")
         level = dry_level(samples, delta)
@@ -99,7 +82,8 @@ def _row(data: CampaignData, info: RunInfo) -> _Row | str:
     elif scenario.lanes:
         return f"less than {LEAST_S:g} s of steady driving on the water"
     late, grown = (_change(x, dry, wet) for x in (samples.array("a_over_v"), 1e-3 * samples.array("v_x") ** 2))
-    return _Row(info, told, values, late, grown, float(wet.size * samples.step_s))
+    driven = _driven(samples, car, dry)
+    return Told(info, scenario, driven, asked, values, late, grown, float(wet.size * samples.step_s))
 
 
 def _change(x: FloatArray, dry: Index, wet: Index) -> tuple[float, float]:
@@ -137,18 +121,18 @@ def _driven(samples: RunSamples, car: Vehicle, index: Index) -> Driven:
     return Driven(v, np.nan_to_num(a), mu)
 
 
-def _coordinates(rows: Sequence[_Row]) -> dict[str, FloatArray]:
+def _coordinates(rows: Sequence[Told]) -> dict[str, FloatArray]:
     def of(key: str) -> FloatArray:
         return np.array([float(r.info.run.values.get(key, 0.0)) for r in rows])
 
-    speed = [float(np.mean((r.told.wet or r.told.dry).v)) for r in rows]
+    speed = [float(np.mean((r.wet or r.dry).v)) for r in rows]
     return {
         "v_x": np.array(speed), "depth": 1e-3 * of("water_depth_mm"), "pressure": 1e5 * of("pressure_rear_bar"),
         "load": of("load_front_kg") + of("load_rear_kg"),
     }  # fmt: skip
 
 
-def _nuisances(rows: Sequence[_Row], names: Sequence[str]) -> FloatArray:
+def _nuisances(rows: Sequence[Told], names: Sequence[str]) -> FloatArray:
     """Free sizes: a radius error of each wheel in each configuration, growth of the radii, and delay of v_x."""
     keys = ("tyre", "pressure_front_bar", "pressure_rear_bar", "load_front_kg", "load_rear_kg")
     groups = [(r.info.run.vehicle.stem, *(str(r.info.run.values.get(k)) for k in keys)) for r in rows]

@@ -15,8 +15,8 @@ from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.gain import log_score_gain, rms_of_both
 from aqualog.diagnose.hypotheses import value_in
 from aqualog.diagnose.records import Cause, ChannelGain, Estimate, Gain
-from aqualog.diagnose.verdict import PLACES, Candidate, Outcome, candidates, decided, whole
-from aqualog.model.term import Effect, Model
+from aqualog.diagnose.verdict import PLACES, Candidate, Causes, Outcome, candidates, decided, whole
+from aqualog.model.term import Effect
 
 __all__ = ["cause_sentence", "conclude", "gain"]
 
@@ -31,7 +31,7 @@ _PLACES = {
 }  # fmt: skip
 
 
-def conclude(found: Found, passes: Passes, given: Model, *, seed: int) -> tuple[Outcome[Option], Gain | None]:
+def conclude(found: Found, passes: Passes, *, seed: int) -> tuple[Outcome[Option], Gain | None]:
     """The verdict on what a competition found, and the gain of its best set; None without one, or with few wet runs.
 
     An unknown form comes before any name. A name needs a gain on runs that were not fitted.
@@ -44,9 +44,7 @@ def conclude(found: Found, passes: Passes, given: Model, *, seed: int) -> tuple[
         won[0] = gain(passes, best.option.refit, found, seed=seed)
         return () if won[0] is None or won[0].low > 0.0 else ("it does not improve the prediction of runs left out.",)
 
-    sets = candidates(
-        [(o, COARSE * o.evidence) for o in found.options], lambda o: _causes(found, o.refit, passes, given)
-    )  # fmt: skip
+    sets = candidates([(o, COARSE * o.evidence) for o in found.options], lambda o: _causes(found, o.refit, passes))
 
     def at_place(group: Sequence[Candidate[Option]]) -> Candidate[Option]:
         # the set at the whole car, unless another place is clearly better
@@ -55,7 +53,7 @@ def conclude(found: Found, passes: Passes, given: Model, *, seed: int) -> tuple[
     return decided(sets, at_place, failing), won[0]
 
 
-def _causes(found: Found, chosen: Refit, passes: Passes, given: Model) -> tuple[tuple[Cause, bool], ...]:
+def _causes(found: Found, chosen: Refit, passes: Passes) -> Causes:
     """The members of a set, and whether a value reaches its smallest size and its interval excludes no change."""
     all_values = iter(estimates(chosen, passes, found.scatter.weight))
     spread = np.sqrt(np.diag(found.scatter.sigma))
@@ -68,7 +66,7 @@ def _causes(found: Found, chosen: Refit, passes: Passes, given: Model) -> tuple[
         wet = [(n, s) for n, s in zip(passes.names, size.tolist(), strict=True) if not n.startswith("dry_")]
         explains = tuple(n for n, s in wet if s > SHARE * size.max())
         large = any(
-            abs(e.value - value_in(given, h, n)) >= max(h.parameter(n).smallest, e.high - e.value)
+            abs(e.value - value_in(found.nothing.model, h, n)) >= max(h.parameter(n).smallest, e.high - e.value)
             for n, e in values.items()
         )
         sentence = cause_sentence(h.effect, h.where, [*values.values()])

@@ -18,7 +18,7 @@ from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model
 
-__all__ = ["RESISTANCE", "Passes", "Told", "channels_of", "doubted", "expected_values", "question_of", "steady"]
+__all__ = ["RESISTANCE", "Passes", "Told", "doubted", "expected_values", "floats", "question_of", "steady"]
 
 RESISTANCE = "resistance"
 LOST_MAX = 0.01  # share of the fluctuation at which a wheel spins; beyond, no steady expectation holds
@@ -36,11 +36,20 @@ class Question(NamedTuple):
 
 
 class Told(NamedTuple):
-    """Inputs of a run for the expectation: configuration and driving state."""
+    """A run: configuration and driving state, and its mean observations by name.
 
+    `late`, `grown`: slip added by one second of delay of v_x [1/s] and by radii that grow by 1e-3 s²/m² v², each as (on
+    dry road, on water minus dry road); `seconds` of driving on water that were used.
+    """
+
+    info: RunInfo
     scenario: Scenario
     dry: Driven
-    wet: Driven | None = None
+    wet: Driven | None
+    values: dict[str, float]
+    late: tuple[float, float]
+    grown: tuple[float, float]
+    seconds: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,25 +58,18 @@ class Passes:
 
     `values` (g, c), NaN where a run has no value; for each driven wheel `slip_slope_<w>`: mean slip on water minus mean
     slip on dry road, and `dry_<w>`: mean slip on dry road [-]; `resistance`: mean resistance measure on water minus the
-    run's dry level [m/s²]. `names` (c,). `told` (g,): inputs of the model. `coordinates` by name (g,): `v_x`, `depth`
-    [m], `load`, `pressure` ...; `nuisances` (g, c, k): columns whose size is free. `infos` (g,). `left_out`: runs, by
-    reason.
+    run's dry level [m/s²]. `names` (c,). `told` (g,): the runs. `coordinates` by name (g,): `v_x`, `depth`
+    [m], `load`, `pressure` ...; `nuisances` (g, c, k): columns whose size is free. `left_out`: runs, by reason.
     """
 
     names: tuple[str, ...]
     values: FloatArray
     told: tuple[Told, ...]
-    infos: tuple[RunInfo, ...]
     coordinates: Mapping[str, FloatArray]
     nuisances: FloatArray
     seconds: FloatArray
     left_out: Mapping[str, int]
     question: Question
-
-
-def channels_of(wheels: Sequence[str]) -> tuple[str, ...]:
-    """Names of the columns."""
-    return (*(f"slip_slope_{w}" for w in wheels), *(f"dry_{w}" for w in wheels), RESISTANCE)
 
 
 def question_of(told: Sequence[Told]) -> Question:
@@ -101,19 +103,22 @@ def _responses(passes: Passes, model: Model, friction: float = 1.0) -> Response:
     return respond(setups, q.run, q.wet, q.driven)
 
 
+def floats(found: Response, here: BoolArray) -> bool:
+    """Whether a wheel keeps too little contact in some samples (n,) for their steady expectation to hold."""
+    lost, contact = found.lost.max(axis=0)[here], found.contact.min(axis=0)[here]
+    return bool(lost.mean() > LOST_MAX or contact.mean() < CONTACT_MIN)
+
+
 def steady(passes: Passes, model: Model) -> Passes:
     """Runs without values where a wheel keeps too little contact by a model for its steady expectation to hold."""
     q, found = passes.question, _responses(passes, model)
-    lost, contact = found.lost.max(axis=0), found.contact.min(axis=0)
-    floats = np.zeros(len(passes.told), dtype=np.bool_)
-    for r in np.unique(q.run[q.wet]):
-        here = (q.run == r) & q.wet
-        floats[r] = lost[here].mean() > LOST_MAX or contact[here].mean() < CONTACT_MIN
-    if not floats.any():
+    wet = set(q.run[q.wet].tolist())
+    gone = np.array([r in wet and floats(found, (q.run == r) & q.wet) for r in range(len(passes.told))])
+    if not gone.any():
         return passes
     return replace(
-        passes, values=np.where(floats[:, None], np.nan, passes.values), seconds=np.where(floats, 0.0, passes.seconds),
-        left_out={**passes.left_out, "a wheel floats in the model that was found": int(floats.sum())},
+        passes, values=np.where(gone[:, None], np.nan, passes.values), seconds=np.where(gone, 0.0, passes.seconds),
+        left_out={**passes.left_out, "a wheel floats in the model that was found": int(gone.sum())},
     )  # fmt: skip
 
 

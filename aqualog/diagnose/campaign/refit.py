@@ -14,7 +14,7 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.campaign.noise import inner, inverse_of, prior_of
 from aqualog.diagnose.campaign.passes import Passes, expected_values
 from aqualog.diagnose.evidence import Evidence
-from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
+from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_free
 from aqualog.diagnose.records import Estimate
 from aqualog.diagnose.refit import PRIOR_WIDTH
 from aqualog.diagnose.search import DOUBT
@@ -65,16 +65,14 @@ def refit(
     """
     members = tuple(evidence.asked[m] for m in chosen)
     columns = [c for m in chosen for c in evidence.columns[m]]
+    told = [(h, h.parameter(n)) for h in members for n in h.free]
+    now, lowest, highest = np.array([(value_in(given, h, p.name), p.low, p.high) for h, p in told]).reshape(-1, 3).T
     sigma = evidence.prior[columns]
     low, high = evidence.low[columns] / sigma, evidence.high[columns] / sigma
 
     def at(t: FloatArray) -> tuple[Model, FloatArray]:
-        off, own = iter((sigma * t).tolist()), []
-        for h in members:
-            # a bound in units of sigma comes back with a rounding error beyond it
-            values = [(h.parameter(n), value_in(given, h, n) + next(off)) for n in h.free]
-            own.append((h, {p.name: min(max(v, p.low), p.high) for p, v in values}))
-        model = with_values(given, own)
+        # a bound in units of sigma comes back with a rounding error beyond it
+        model = with_free(given, members, np.clip(now + sigma * t, lowest, highest))
         return model, passes.values - expected_values(passes, model)[0]
 
     def loss(e: FloatArray, t: FloatArray) -> float:

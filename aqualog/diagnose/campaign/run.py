@@ -51,24 +51,19 @@ def diagnose_campaign(
     if wet < LEAST_RUNS:
         reason = f"{wet} usable runs on water, at least {LEAST_RUNS} needed"
         return Diagnosis(
-            "not_testable", f"Not testable: {reason}.", tuple(i.name for i in passes.infos), _driven_s(data),
+            "not_testable", f"Not testable: {reason}.", tuple(t.info.name for t in passes.told), _driven_s(data),
             float(passes.seconds.sum()), given, passes.names, notes=(reason, *_notes(passes)),
         )  # fmt: skip
-    asked = hypotheses(passes)
-
-    def found_in(some: Passes) -> Found:
-        return compete(some, given, asked, level=o.level, surrogates=o.surrogates, seed=o.seed, say=progress)
-
-    passes = doubted(passes, given)
-    found = found_in(passes)
+    asked, passes = hypotheses(passes), doubted(passes, given)
+    found = compete(passes, given, asked, o, progress)
     if found.options:
         kept = steady(passes, found.options[0].refit.model)
         if kept is not passes and np.isfinite(kept.values[:, -1]).sum() >= LEAST_RUNS:
             progress("repeating without runs that float in the new model")
             passes = kept
-            found = found_in(passes)._replace(significance=found.significance)
+            found = compete(passes, given, asked, o, progress)._replace(significance=found.significance)
     progress("gain on runs left out")
-    return _diagnosed(data, passes, found, *conclude(found, passes, given, seed=o.seed), o.level)
+    return _diagnosed(data, passes, found, *conclude(found, passes, seed=o.seed), o.level)
 
 
 def _diagnosed(
@@ -77,9 +72,8 @@ def _diagnosed(
     evidence, c, p = found.evidence, found.calibration, found.significance.p_value
     after = d.best.option.refit if d.best is not None and d.verdict != "cannot_tell" else found.nothing
     # limits are what the runs show, whether or not it is worth naming
-    sizes = isolate.reference_sizes(
-        replace(evidence, smallest=np.zeros(evidence.count)), found.gram, c.threshold
-    )  # fmt: skip
+    shown = replace(evidence, smallest=np.zeros(evidence.count))
+    sizes = isolate.reference_sizes(shown, found.gram, c.threshold)
     reason = f" ({short_form(found.forms[0])})" if found.forms else ""
     sentence = verdict_sentence(
         d.verdict, d.causes, level=level, reason=reason, certain=d.certain,
@@ -90,7 +84,7 @@ def _diagnosed(
     return Diagnosis(
         verdict=d.verdict,
         sentence=sentence,
-        drives=tuple(i.name for i in passes.infos),
+        drives=tuple(t.info.name for t in passes.told),
         duration_s=_driven_s(data),
         used_s=float(passes.seconds.sum()),
         causes=d.causes,
