@@ -26,7 +26,7 @@ from aqualog.io.tables.columns import (
 )  # fmt: skip
 from aqualog.io.tables.csv_cells import STYLES, numbers, plain
 from aqualog.io.tables.csv_dialect import Column, Layout, find_layout, is_comment, split_line
-from aqualog.io.tables.csv_text import TextFile, count_of, open_text, read_text
+from aqualog.io.tables.csv_text import TextFile, count_of, marks_of, open_text, read_text
 
 __all__ = ["CsvReader"]
 
@@ -66,9 +66,12 @@ class RowFaults:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """The rows below the header: `text` has one row per line from `start` on, `lines` (n,) are their line numbers."""
+    """The rows below the header: `text` has one row per line from `start` on, `lines` (n,) are their line numbers.
 
-    text: bytes
+    A text that is a file has no quotes; the library reads it by itself.
+    """
+
+    text: Text
     separator: str
     names: int
     lines: NDArray[np.int64]
@@ -106,19 +109,29 @@ class Rows:
         return found
 
     def _split(self, columns: Sequence[int], numbers: Collection[int]) -> pl.DataFrame:
+        text, is_held = self.text, isinstance(self.text, bytes)
         return pl.read_csv(
-            self.text,
+            text if isinstance(text, bytes) else text.path,
+            glob=False,
             has_header=False,
             schema={f"c{k}": pl.Float64 if k in numbers else pl.String for k in range(self.names)},
             columns=sorted(set(columns)),
             separator=self.separator,
-            quote_char='"' if self.separator != _JOIN and self.text.find(b'"', self.start) >= 0 else None,
-            skip_lines=self.text.count(b"\n", 0, self.start),
+            quote_char='"' if is_held and self.separator != _JOIN and text.find(b'"', self.start) >= 0 else None,
+            skip_lines=text[: self.start].count(b"\n"),
         )
 
 
-def find_rows(data: bytes, layout: Layout) -> Rows:
-    """Find the rows below the header; see `rows_of`."""
+def find_rows(data: Text, layout: Layout) -> Rows:
+    """Find the rows below the header; see `rows_of`. A regular file is not held."""
+    if isinstance(data, TextFile):
+        start = behind(data, layout.first_line - 1)
+        is_cut = data[-1:] != b"\n"
+        marks = data.marks[len(marks_of(data[:start])) :] + b"\n" * is_cut
+        lines = _lines_of(marks, layout)
+        if lines:
+            return _regular(data, layout, layout.first_line, lines, is_cut=is_cut, start=start)
+        data = data[:]
     is_cut, end = not data.endswith((b"\n", b"\r")), _end(data)
     body = data if data[end:] in (b"", b"\n", b"\r\n") else data[:end]  # a copy would take as long as reading the file
     return rows_of(body, layout, layout.first_line, is_cut=is_cut, start=behind(data, layout.first_line - 1))
@@ -133,17 +146,21 @@ def rows_of(body: bytes, layout: Layout, first_line: int, *, is_cut: bool, start
     Nearly all files are regular: every line has the separators of a whole row. Only such a file is passed to the
     library unchanged, because it silently drops the cells of longer rows and fills up shorter ones.
     """
-    lines = None if b"\0" in body else _regular(body, layout, start)
+    lines = None if b"\0" in body else _lines_in(body, layout, start)
     if lines is not None:
-        numbers = first_line + np.arange(lines, dtype=np.int64)
-        doubtful = int(numbers[-1]) if is_cut and lines and _ends_short(body, layout.separator) else 0
-        rows = Rows(body, layout.separator, len(layout.columns), numbers, RowFaults(doubtful_line=doubtful), start)
-        if body.find(b'"', start) < 0 or _is_quoted_plainly(rows):
+        rows = _regular(body, layout, first_line, lines, is_cut=is_cut, start=start)
+        if body.find(b'"', start) < 0 or _is_quoted_plainly(rows, body):
             return rows
     return _irregular(body[start : _end(body)], layout, first_line, is_cut=is_cut)
 
 
-def _ends_short(body: bytes, separator: str) -> bool:
+def _regular(body: Text, layout: Layout, first_line: int, count: int, *, is_cut: bool, start: int) -> Rows:
+    numbers = first_line + np.arange(count, dtype=np.int64)
+    doubtful = int(numbers[-1]) if is_cut and count and _ends_short(body, layout.separator) else 0
+    return Rows(body, layout.separator, len(layout.columns), numbers, RowFaults(doubtful_line=doubtful), start)
+
+
+def _ends_short(body: Text, separator: str) -> bool:
     """Whether the last cell is shorter than those above it: it may be half a number."""
     tail = body[-_TAIL:].split(b"\n")[-_ABOVE - 1 :]
     *above, last = (len(line.rpartition(separator.encode())[2].strip()) for line in tail)
@@ -189,33 +206,32 @@ def _end(data: bytes) -> int:
     return end
 
 
-def _regular(body: bytes, layout: Layout, start: int) -> int | None:
+def _lines_in(body: bytes, layout: Layout, start: int) -> int | None:
     """Number of lines from `start` on, if each has exactly the separators of a whole row and none is a comment."""
     if not _end(body[start : start + 2]) and len(body) <= start + 2:
         return 0
-    separator = layout.separator.encode()
-    if layout.width > len(layout.columns):
-        return None
-    others = _ALL.translate(None, separator + b"\n" + _COMMENT)
+    others = _ALL.translate(None, layout.separator.encode() + b"\n" + _COMMENT)
     signs = body.translate(None, others)[len(body[:start].translate(None, others)) :]
-    signs = signs if body.endswith(b"\n") else signs + b"\n"
-    comments = [sign for sign in _COMMENT if sign in signs and sign != separator[0]]
-    if comments:
-        if body[start] in comments or any(body.find(b"\n%c" % sign, start) >= 0 for sign in comments):
-            return None
-        signs = signs.translate(None, bytes(comments))
-    row = separator * (layout.width - 1) + b"\n"
+    comments = [sign for sign in _COMMENT if sign in signs and sign != ord(layout.separator)]
+    if comments and (body[start] in comments or any(body.find(b"\n%c" % sign, start) >= 0 for sign in comments)):
+        return None
+    return _lines_of(signs.translate(None, bytes(comments)) + b"\n" * (not body.endswith(b"\n")), layout)
+
+
+def _lines_of(signs: bytes, layout: Layout) -> int | None:
+    """Number of lines, if these signs in their order are the separators of whole rows and ends of lines alone."""
+    row = layout.separator.encode() * (layout.width - 1) + b"\n"
     lines, rest = divmod(len(signs), len(row))
-    return lines if not rest and signs == row * lines else None
+    return lines if layout.width == len(layout.columns) and not rest and signs == row * lines else None
 
 
-def _is_quoted_plainly(rows: Rows) -> bool:
+def _is_quoted_plainly(rows: Rows, body: bytes) -> bool:
     """Return whether the library also finds one row per line: then no quotes hold a separator or a line's end.
 
     A line with an odd quote is a row of its own to the library only if it is the last one. A quoted cell that goes on
     behind its quote is lost.
     """
-    text = rows.text[rows.start : _end(rows.text)]
+    text = body[rows.start : _end(body)]
     octets = np.frombuffer(b"\n" + text + b"\n", dtype=np.uint8)
     quotes = np.flatnonzero(octets == ord('"'))
     before = np.searchsorted(quotes, np.flatnonzero(octets == ord("\n")))  # quotes up to the end of each line
@@ -284,7 +300,7 @@ class CsvReader(TableReader):
         self._told = format_of(options.csv, path.name)
         self._data: bytes | TextFile = self._text()
         self._layout = find_layout(self._data, where=str(path), told=self._told)
-        ends = self._data.count(b"\n") if isinstance(self._data, TextFile) else count_of(b"\n", self._data)
+        ends = self._data.lines if isinstance(self._data, TextFile) else count_of(b"\n", self._data)
         ends += self._data[-1:] != b"\n"
         self._count = max(0, ends - self._layout.first_line + 1)
         self._size = len(self._data)
@@ -341,7 +357,7 @@ class CsvReader(TableReader):
         """The same piece by piece where the file is large and its time is a number; else in one."""
         asked = list(wanted)
         numeric = self._layout.columns[self._time.index].kind == "number"
-        if isinstance(self._data, TextFile) and numeric:
+        if isinstance(self._data, TextFile) and self._data.is_large and numeric:
             return [part_of(asked, self._pieces(asked, self._data))]
         return [one_piece(asked, self.read)]
 
@@ -430,8 +446,8 @@ class CsvReader(TableReader):
 
     def _found_rows(self) -> Rows:
         if self._rows is None:
-            data = self._data if isinstance(self._data, bytes) else self._data[:]
-            self._rows, self._data = find_rows(data, self._layout), b""
+            self._rows = find_rows(self._data, self._layout)
+            self._data = self._data if isinstance(self._data, TextFile) else b""
             self._note_rows(self._rows.faults, len(self._rows.lines))
         return self._rows
 

@@ -86,8 +86,10 @@ class Numbers:
 def numbers(cells: pl.Series, style: Style) -> Numbers:
     """Convert the cells of one column, which are text or read as numbers already; a cell is never guessed at."""
     if cells.dtype == pl.Float64:
-        values: FloatArray = cells.to_numpy().astype(np.float64)
-        values[~np.isfinite(values)] = np.nan
+        values: FloatArray = cells.to_numpy()  # the library's own memory, where no cell is blank
+        finite = np.isfinite(values)
+        if not finite.all():
+            values = np.where(finite, values, np.nan)
         return Numbers(values, cells.is_null().to_numpy().copy(), np.zeros(len(cells), dtype=np.bool_))
     found = plain(cells, style).cast(pl.Float64, strict=False)
     values = found.to_numpy().astype(np.float64)

@@ -22,11 +22,15 @@ from aqualog.core.units import is_unit
 from aqualog.io.reader import csv_hint
 from aqualog.io.tables.columns import split_unit
 
-__all__ = ["LARGE", "LONGEST_LINE", "LogText", "TextFile", "check_lines", "count_of", "open_text", "read_text"]
+__all__ = [
+    "LARGE", "LONGEST_LINE", "LogText", "TextFile", "check_lines", "count_of", "marks_of", "open_text", "read_text",
+]  # fmt: skip
 
-LARGE = 1 << 28  # [bytes] from which a file is not held as a whole
+LARGE = 1 << 28  # [bytes] from which a file is read piece by piece
 LONGEST_LINE = 1 << 24  # [bytes] beyond, a file is no table
-_BLOCK = 1 << 24  # not above the longest line
+_SMALL = 1 << 20  # [bytes] below which a file is held
+_BLOCK = 1 << 20  # [bytes] not above the longest line; larger ones cost more in new pages than in copying
+_NO_MARKS = bytes(range(256)).translate(None, b',;\t|\n\0"#%!/')
 _MARKS = (
     (codecs.BOM_UTF32_LE, "utf-32"), (codecs.BOM_UTF32_BE, "utf-32"), (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
@@ -37,14 +41,23 @@ _CACHED = 1 << 18
 
 
 class TextFile:
-    """Bytes of a file: length, slices, `find` and `count`, as of a `bytes` object."""
+    """Bytes of a file: length, slices, `find` and `count`, as of a `bytes` object.
+
+    `lines` is the number of its ends of lines, `marks` what shapes a table in it (`marks_of`), unless it is large.
+    """
 
     def __init__(self, path: Path) -> None:
+        self.path, self.lines, self.marks = path, 0, b""
         self._handle = os.open(path, os.O_RDONLY | getattr(os, "O_BINARY", 0))
         self._size = os.fstat(self._handle).st_size
 
     def __len__(self) -> int:
         return self._size
+
+    @property
+    def is_large(self) -> bool:
+        """Whether it is to be read piece by piece."""
+        return self._size >= LARGE
 
     def __getitem__(self, key: slice) -> bytes:
         start, stop, _ = key.indices(self._size)
@@ -67,10 +80,6 @@ class TextFile:
             start += _BLOCK
         return -1
 
-    def count(self, what: bytes) -> int:
-        """How often one byte stands in the file."""
-        return sum(count_of(what, block) for block in self.blocks())
-
     def blocks(self, start: int = 0, size: int | None = None) -> Iterator[bytes]:
         """The file in blocks from a place on."""
         while start < self._size:
@@ -83,6 +92,11 @@ class TextFile:
         if self._handle >= 0:
             os.close(self._handle)
             self._handle = -1
+
+
+def marks_of(data: bytes) -> bytes:
+    """Separators, quotes, comment signs, NUL bytes and ends of lines of a text, in their order."""
+    return data.translate(None, _NO_MARKS)
 
 
 def count_of(what: bytes, data: bytes) -> int:
@@ -122,18 +136,18 @@ class _LineLengths:
         self._where = where
         self._line, self._open = 1, 0  # number of the line that the last block ended in, and its bytes so far
 
-    def add(self, block: bytes) -> None:
+    def add(self, block: bytes, ends: int) -> None:
         first = block.find(b"\n")
         self._open += len(block) if first < 0 else first
         if self._open > LONGEST_LINE and b"\r" not in block:
             raise _too_long(self._line, self._where)
         if first >= 0:
-            self._line += block.count(b"\n")
+            self._line += ends
             self._open = len(block) - block.rfind(b"\n") - 1
 
 
 def open_text(path: Path) -> TextFile | None:
-    """A large file that is plain UTF-8 with lines that end in `\\n`; None for every other one.
+    """A file that is plain UTF-8 with lines that end in `\\n`; None for a small one and every other.
 
     Raises
     ------
@@ -142,22 +156,26 @@ def open_text(path: Path) -> TextFile | None:
     LogError
         If a line is longer than any row of a table.
     """
-    if path.stat().st_size < LARGE:
+    if path.stat().st_size < min(_SMALL, LARGE):
         return None
     text = TextFile(path)
     decoder = codecs.getincrementaldecoder("utf-8")()
-    lines, lengths = False, _LineLengths(str(path))
+    lengths, marks = _LineLengths(str(path)), []
     try:
         for k, block in enumerate(text.blocks()):
             if k == 0 and block.startswith((codecs.BOM_UTF8, *(mark for mark, _ in _MARKS))):
                 break
-            lines |= b"\n" in block
-            lengths.add(block)
+            if not text.is_large:
+                marks.append(marks_of(block))
+            ends = (marks[-1] if marks else block).count(b"\n")
+            text.lines += ends
+            lengths.add(block, ends)
             if not block.isascii() or decoder.getstate()[0]:
                 decoder.decode(block)
         else:
             decoder.decode(b"", final=True)
-            if lines:
+            text.marks = b"".join(marks)
+            if text.lines:
                 return text
     except UnicodeDecodeError:
         pass

@@ -70,6 +70,28 @@ def test_pieces_are_the_whole(name, size, tmp_path, monkeypatch):
         np.testing.assert_array_equal(reader.read(infos)[0].values, whole[0].values)
 
 
+REGULAR = {"plain", "no end of the last line", "windows", "semicolons", "umlauts", "comments above"}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_regular_file_is_not_held(name, tmp_path, monkeypatch):
+    path = tmp_path / "a[1]*.csv"  # a name, not a pattern
+    path.write_bytes(FILES[name].encode())
+    with CsvReader(path, ReadOptions()) as reader:
+        infos = reader.channels()
+        whole, faults = reader.read(infos), reader.faults
+    monkeypatch.setattr(text_file, "_SMALL", 1)
+    monkeypatch.setattr(text_file, "_BLOCK", 777)
+    with CsvReader(path, ReadOptions()) as reader:
+        assert reader.channels() == infos
+        found = reader.read(infos)
+        assert isinstance(reader._rows.text, TextFile) or name not in REGULAR
+        assert reader.faults == faults
+    for a, b in zip(found, whole, strict=True):
+        np.testing.assert_array_equal(a.t_ns, b.t_ns)
+        np.testing.assert_array_equal(a.values, b.values)
+
+
 @pytest.mark.parametrize(
     "data", [b"\xef\xbb\xbft,a\n1,2\n", "t,a\n1,2\n".encode("utf-16"), b"t,a\xb0C\n1,2\n", b"t,a\r1,2\r"]
 )
@@ -87,5 +109,5 @@ def test_a_letter_across_two_blocks_is_plain_text(tmp_path, monkeypatch):
     path.write_bytes("t,aüüüü\n1,2\n".encode())
     text = open_text(path)
     assert text[:] == path.read_bytes()
-    assert (text.find(b"\n"), text.find(b"x"), text.count(b"\n"), text[-1:]) == (11, -1, 2, b"\n")
+    assert (text.find(b"\n"), text.find(b"x"), text.lines, text[-1:]) == (11, -1, 2, b"\n")
     text.close()
