@@ -125,7 +125,7 @@ def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
 
 
 def odd_wheels(found: Sequence[PerTurn]) -> tuple[Remainder, ...]:
-    """Wheels whose speed varies with their angle much more than any other wheel's, without being a ring to name.
+    """Wheels whose speed varies with their angle much more than any other wheel's, and not as a ring makes it.
 
     A force or torque that comes with every turn, a tyre out of true, an uneven pick-up: the log does not show which.
     """
@@ -138,19 +138,18 @@ def odd_wheels(found: Sequence[PerTurn]) -> tuple[Remainder, ...]:
         how = f"the speed of wheel {f.wheel.upper()}, varying {_often(f.order)} per turn by {f.amplitude:.2%}, "
         how += f"{times:.0f} times as much as any other wheel's"
         p = tempered(1.0 / (1.0 - SOUND * math.e * f.p_value * math.log(max(f.p_value, 1e-300))))
-        nearest = _RING.name if f.order == 1 and f.kind == "ring" else None
         said = f"Unexplained: {how} (probability {p:.2f})."
         made, half = f.amplitude * np.cos(f.order * angle), 0.5 * (f.high - f.low)
         out.append(Remainder(
             f"slip_{f.wheel}", ("angle",), math.nan, f.p_value, angle[:, None], made, made - half, made + half, (),
-            nearest, 1.0 if nearest else math.nan, said, "slip", "-", p, how,
+            None, math.nan, said, "slip", "-", p, how,
         ))  # fmt: skip
     return tuple(out)
 
 
 def _times(f: PerTurn, found: Sequence[PerTurn]) -> float:
     """How many times as much as any other wheel's a speed varies, where that is an unknown form; else 0."""
-    is_ring = any(f"omega_{f.wheel}" in c.explains for c in to_causes(found))
+    is_ring = (f.order == 1 and f.kind == "ring") or any(f"omega_{f.wheel}" in c.explains for c in to_causes(found))
     others = [o.amplitude for o in found if o.order == f.order and o.wheel != f.wheel and o.kind != "untested"]
     times = f.amplitude / max(*others, 1e-5) if others and f.found and not is_ring else 0.0
     return times if f.amplitude >= ODD and times >= TIMES else 0.0

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.diagnose.any_effect import ALIKE as SAME
 from aqualog.diagnose.arena import Arena, Field
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.compete import Fitted, Posterior
@@ -18,6 +17,7 @@ from aqualog.diagnose.competition import Block
 from aqualog.diagnose.hypotheses import WORTH
 from aqualog.diagnose.records import SURE, Remainder, tempered
 from aqualog.diagnose.sets import Sets, evidence_of, fitted_in
+from aqualog.diagnose.unknown_term import ALIKE as SAME
 from aqualog.diagnose.unknown_term import describe
 
 __all__ = ["Clear", "clear_forms", "described", "unknown_forms"]

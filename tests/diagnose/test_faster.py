@@ -98,9 +98,9 @@ def test_a_wheel_that_varies_unlike_the_others_is_an_unknown_form():
     for others in ([replace(x, amplitude=8e-4) for x in small], [*small, ring("rr")], []):
         assert faster.odd_wheels([*others, odd]) == ()
     assert faster.odd_wheels([*small, replace(odd, kind="nothing")]) == ()
-    (once,) = faster.odd_wheels([*(ring(w, 3e-4) for w in ("fl", "fr")), ring("rl", 1.8e-3)])
-    assert once.nearest == "tone_ring"
-    assert "too little" not in " ".join(remarks([*(ring(w, 3e-4) for w in ("fl", "fr")), ring("rl", 1.8e-3)]))
+    small_ring = [*(ring(w, 3e-4) for w in ("fl", "fr")), ring("rl", 1.8e-3)]
+    assert faster.odd_wheels(small_ring) == ()  # a known effect makes it
+    assert "too little" in " ".join(remarks(small_ring))
 
 
 def test_what_sound_wheels_show_is_no_name():
