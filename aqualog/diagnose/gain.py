@@ -52,7 +52,8 @@ def measured_gain(
     """Error and log score of models on drives with the channels that the noise was fitted on.
 
     `models`: as the file has it, the same at the car's likeliest values, and extended at its likeliest values. Errors
-    fall from the first to the last; the log score is gained over the second, so that it is the effects' alone.
+    fall from the first to the last; the log score is gained over the better of the first two, so that it is the
+    effects' alone. The likeliest values of one drive may let a wheel spin in another.
     `noise`: of the diagnosed drive after its best set, one measure for all models; `seed` of the bootstrap;
     `in_sample`: these are the diagnosed drives themselves. The channel `speed` is the error of a simulation that runs
     free for half a minute [m/s].
@@ -72,9 +73,10 @@ def measured_gain(
         own = [(d, bridged(r, d.mask), for_mask(noise, d.mask)) for d, r in zip(drives, residuals, strict=True)]
         return [block_scores(whitened(r[None], n).reshape(r.shape), block_step(d.dt)) for d, r, n in own]
 
-    scores = [scores_of(own) for own in (alone, y)]
-    won = log_score_gain(scores[0], scores[1], seed=seed)
-    notes = scope(names, scores[0], scores[1], won, in_sample=in_sample)
+    before = max(scores_of(x), scores_of(alone), key=lambda own: sum(float(s.sum()) for s in own))
+    after = scores_of(y)
+    won = log_score_gain(before, after, seed=seed)
+    notes = scope(names, before, after, won, in_sample=in_sample)
     return Gain(tuple(channels), *won, () if in_sample else names, in_sample, consequences, notes)
 
 

@@ -262,6 +262,18 @@ def test_gain_is_on_unseen_drives_where_there_are_any():
     assert {t.effect.name for t in d.deviations}.isdisjoint({t.effect.name for t in d.model.terms} | {"head_wind"})
 
 
+def test_the_gain_is_over_the_better_of_both_models_without_the_effect(monkeypatch):
+    """The likeliest values of one drive may be absurd in another."""
+    ask(monkeypatch, ("payload_mass", "torque_gain"))
+    monkeypatch.setattr(arena, "shapes", lambda *_: ())
+    hidden, gains = term("payload_mass", delta_mass=250.0), []
+    for alone in (Model(()), Model((term("torque_gain", gain=0.3),))):
+        monkeypatch.setattr(run, "_at_likeliest", lambda f, e, bare, more, m=alone: (m, more, list(e.residuals)))
+        d = diagnose([("a", noisy(hidden))], CAR, holdout=[("b", noisy(hidden, seed=4))], options=QUICK)
+        gains.append(d.gain.log_score)
+    assert gains[1] == pytest.approx(gains[0])
+
+
 @pytest.mark.parametrize(
     ("hidden", "verdict"),
     [(term("torque_gain", gain=0.85), "cannot_tell"), (term("head_wind", speed=12.0), "named")], ids=["car", "drive"],
