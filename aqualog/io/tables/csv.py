@@ -25,7 +25,7 @@ from aqualog.io.tables.columns import (
     no_unit_note,
 )  # fmt: skip
 from aqualog.io.tables.csv_cells import STYLES, numbers, plain
-from aqualog.io.tables.csv_dialect import Column, Layout, find_layout, is_comment, split_line
+from aqualog.io.tables.csv_dialect import Column, Layout, find_layout, is_comment, lines_in, lines_of, split_line
 from aqualog.io.tables.csv_text import TextFile, count_of, marks_of, open_text, read_text
 
 __all__ = ["CsvReader"]
@@ -39,7 +39,6 @@ Text = bytes | TextFile
 PIECE = 1 << 24  # [bytes]
 _ABOVE = 20  # lines
 _JOIN = "\x1f"  # unit separator: in no cell
-_ALL, _COMMENT = bytes(range(256)), b"#%!/"
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +127,7 @@ def find_rows(data: Text, layout: Layout) -> Rows:
         start = behind(data, layout.first_line - 1)
         is_cut = data[-1:] != b"\n"
         marks = data.marks[len(marks_of(data[:start])) :] + b"\n" * is_cut
-        lines = _lines_of(marks, layout)
+        lines = lines_of(marks, layout)
         if lines:
             return _regular(data, layout, layout.first_line, lines, is_cut=is_cut, start=start)
         data = data[:]
@@ -146,7 +145,7 @@ def rows_of(body: bytes, layout: Layout, first_line: int, *, is_cut: bool, start
     Nearly all files are regular: every line has the separators of a whole row. Only such a file is passed to the
     library unchanged, because it silently drops the cells of longer rows and fills up shorter ones.
     """
-    lines = None if b"\0" in body else _lines_in(body, layout, start)
+    lines = None if b"\0" in body else lines_in(body, layout, start)
     if lines is not None:
         rows = _regular(body, layout, first_line, lines, is_cut=is_cut, start=start)
         if body.find(b'"', start) < 0 or _is_quoted_plainly(rows, body):
@@ -204,25 +203,6 @@ def _end(data: bytes) -> int:
     while end and data[end - 1] in b"\r\n":
         end -= 1
     return end
-
-
-def _lines_in(body: bytes, layout: Layout, start: int) -> int | None:
-    """Number of lines from `start` on, if each has exactly the separators of a whole row and none is a comment."""
-    if not _end(body[start : start + 2]) and len(body) <= start + 2:
-        return 0
-    others = _ALL.translate(None, layout.separator.encode() + b"\n" + _COMMENT)
-    signs = body.translate(None, others)[len(body[:start].translate(None, others)) :]
-    comments = [sign for sign in _COMMENT if sign in signs and sign != ord(layout.separator)]
-    if comments and (body[start] in comments or any(body.find(b"\n%c" % sign, start) >= 0 for sign in comments)):
-        return None
-    return _lines_of(signs.translate(None, bytes(comments)) + b"\n" * (not body.endswith(b"\n")), layout)
-
-
-def _lines_of(signs: bytes, layout: Layout) -> int | None:
-    """Number of lines, if these signs in their order are the separators of whole rows and ends of lines alone."""
-    row = layout.separator.encode() * (layout.width - 1) + b"\n"
-    lines, rest = divmod(len(signs), len(row))
-    return lines if layout.width == len(layout.columns) and not rest and signs == row * lines else None
 
 
 def _is_quoted_plainly(rows: Rows, body: bytes) -> bool:

@@ -21,7 +21,7 @@ from aqualog.io.tables.columns import split_unit, unique_names
 from aqualog.io.tables.csv_cells import STYLES, Style, is_bad, is_clock, is_date, is_number, is_stamp
 from aqualog.io.tables.csv_text import TextFile
 
-__all__ = ["Column", "ColumnKind", "Layout", "find_layout", "is_comment", "split_line"]
+__all__ = ["Column", "ColumnKind", "Layout", "find_layout", "is_comment", "lines_in", "lines_of", "split_line"]
 
 ColumnKind = Literal["number", "stamp", "date", "clock", "blank", "text"]
 Row = list[str]
@@ -33,6 +33,7 @@ _BODY_ROWS = 300
 _SPREAD = 12  # places behind the head where rows are looked at
 _SPREAD_ROWS = 20
 _COMMENTS = ("#", "%", "//", "!")
+_ALL, _COMMENT = bytes(range(256)), b"#%!/"
 _SHOWN = {"\t": "tab", ",": "comma", ";": "semicolon", "|": "bar"}
 _HINT = (
     f"{csv_hint('separator', 'decimal', 'encoding')}; or export it with one header line (name [unit]), one separator "
@@ -380,3 +381,22 @@ def _kind(column: _Cells, style: Style) -> tuple[ColumnKind, float, str]:
     if hits and len(cells) - hits <= allowed:
         return kind, 0.0, ""
     return "text", len(texts) / len(cells), texts[0]
+
+
+def lines_in(body: bytes, layout: Layout, start: int) -> int | None:
+    """Number of lines from `start` on, if each has exactly the separators of a whole row and none is a comment."""
+    if not body[start : start + 2].strip(b"\r\n") and len(body) <= start + 2:
+        return 0
+    others = _ALL.translate(None, layout.separator.encode() + b"\n" + _COMMENT)
+    signs = body.translate(None, others)[len(body[:start].translate(None, others)) :]
+    comments = [sign for sign in _COMMENT if sign in signs and sign != ord(layout.separator)]
+    if comments and (body[start] in comments or any(body.find(b"\n%c" % sign, start) >= 0 for sign in comments)):
+        return None
+    return lines_of(signs.translate(None, bytes(comments)) + b"\n" * (not body.endswith(b"\n")), layout)
+
+
+def lines_of(signs: bytes, layout: Layout) -> int | None:
+    """Number of lines, if these signs in their order are the separators of whole rows and ends of lines alone."""
+    row = layout.separator.encode() * (layout.width - 1) + b"\n"
+    lines, rest = divmod(len(signs), len(row))
+    return lines if layout.width == len(layout.columns) and not rest and signs == row * lines else None
