@@ -235,17 +235,15 @@ def _at_likeliest(
 
 
 def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str]) -> Outcome[Option]:
-    """The outcome, without a name of car or tyre where held-out drives are not predicted better beyond chance.
+    """The outcome, without a name of car or tyre where held-out drives are not predicted better.
 
     A load, a wind or a road may be the diagnosed drive's alone; `rings` are certain without other drives.
     """
-    predicts = gained is None or gained.in_sample
-    if gained is not None and not predicts:  # a drive of a single block has no interval
-        predicts = (gained.log_score if math.isnan(gained.low) else gained.low) > 0.0
+    predicts = gained is None or gained.in_sample or gained.log_score > 0.0
     stays = all(EFFECTS[c.effect].belongs in ("car", "tyre") for c in outcome.causes)
     if predicts or not stays or outcome.verdict not in ("named", "compound"):
         return outcome
-    note = "Not named: held-out drives are not predicted better with it, beyond chance."
+    note = "Not named: held-out drives are not predicted better with it."
     return outcome._replace(verdict="cannot_tell", certain=rings, notes=(*outcome.notes, note))
 
 
