@@ -262,9 +262,8 @@ def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
         # one road: a constant slope is its mean, whose interval knows that it is an offset as well
         outcome = outcome._replace(causes=tuple(c for c in outcome.causes if c.effect != cause.effect))
     is_sure = outcome.verdict != "cannot_tell" or "accelerometer_bias" in outcome.certain
-    if is_sure and any(
-        c.effect == "accelerometer_bias" for c in outcome.causes
-    ):  # it has the constant that a mean would repeat
+    # an offset of the accelerometer has the constant that a mean would repeat
+    if is_sure and any(c.effect == "accelerometer_bias" for c in outcome.causes):
         cause = replace(cause, parameters={n: e for n, e in cause.parameters.items() if n != "grade_mean"})
     return outcome.beside(cause)
 

@@ -67,7 +67,7 @@ class RowFaults:
 class Rows:
     """The rows below the header: `text` has one row per line from `start` on, `lines` (n,) are their line numbers.
 
-    A text that is a file has no quotes; the library reads it by itself.
+    A text that is a file has no quotes; the library reads it by itself, so many lines of it: a log may still grow.
     """
 
     text: Text
@@ -111,6 +111,7 @@ class Rows:
         text, is_held = self.text, isinstance(self.text, bytes)
         return pl.read_csv(
             text if isinstance(text, bytes) else text.path,
+            n_rows=None if is_held else len(self.lines),
             glob=False,
             has_header=False,
             schema={f"c{k}": pl.Float64 if k in numbers else pl.String for k in range(self.names)},

@@ -110,7 +110,7 @@ def _on_causes(d: Mapping[str, Any], said: Mapping[str, list[str]], level: str) 
 
 def _on_gain(said: Mapping[str, list[str]], figures: Mapping[str, Any]) -> list[Section]:
     hint = (
-        "log score: a gain of 1 makes the measurement 2.7 times as probable as with the car's likeliest values alone; "
+        "log score: a gain of 1 makes the measurement 2.7 times as probable as without the causes; "
         "errors: root mean square, for the next sample or in a simulation that runs on by itself"
     )
     gain = said["score"] + said["channels"] + said["gain_notes"]

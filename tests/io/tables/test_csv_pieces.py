@@ -44,14 +44,18 @@ FILES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("size", [60, 1000, 1 << 20])
-@pytest.mark.parametrize("name", FILES)
-def test_pieces_are_the_whole(name, size, tmp_path, monkeypatch):
-    path = tmp_path / "a.csv"
+def held(path, name):
+    """A file of this name, its channels, what a reader that holds it finds in them, and its faults."""
     path.write_bytes(FILES[name].encode())
     with CsvReader(path, ReadOptions()) as reader:
         infos = reader.channels()
-        whole, faults = reader.read(infos), reader.faults
+        return path, infos, reader.read(infos), reader.faults
+
+
+@pytest.mark.parametrize("size", [60, 1000, 1 << 20])
+@pytest.mark.parametrize("name", FILES)
+def test_pieces_are_the_whole(name, size, tmp_path, monkeypatch):
+    path, infos, whole, faults = held(tmp_path / "a.csv", name)
     monkeypatch.setattr(text_file, "LARGE", 1)
     monkeypatch.setattr(text_file, "_BLOCK", 777)
     monkeypatch.setattr(csv, "PIECE", size)
@@ -75,11 +79,7 @@ REGULAR = {"plain", "no end of the last line", "windows", "semicolons", "umlauts
 
 @pytest.mark.parametrize("name", FILES)
 def test_a_regular_file_is_not_held(name, tmp_path, monkeypatch):
-    path = tmp_path / "a[1]*.csv"  # a name, not a pattern
-    path.write_bytes(FILES[name].encode())
-    with CsvReader(path, ReadOptions()) as reader:
-        infos = reader.channels()
-        whole, faults = reader.read(infos), reader.faults
+    path, infos, whole, faults = held(tmp_path / "a[1]*.csv", name)  # a name, not a pattern
     monkeypatch.setattr(text_file, "_SMALL", 1)
     monkeypatch.setattr(text_file, "_BLOCK", 777)
     with CsvReader(path, ReadOptions()) as reader:
@@ -90,6 +90,15 @@ def test_a_regular_file_is_not_held(name, tmp_path, monkeypatch):
     for a, b in zip(found, whole, strict=True):
         np.testing.assert_array_equal(a.t_ns, b.t_ns)
         np.testing.assert_array_equal(a.values, b.values)
+
+
+def test_a_file_that_grows_is_read_as_far_as_it_went(tmp_path, monkeypatch):
+    path, infos, whole, _ = held(tmp_path / "a.csv", "plain")
+    monkeypatch.setattr(text_file, "_SMALL", 1)
+    with CsvReader(path, ReadOptions()) as reader:
+        with path.open("a", encoding="utf-8") as file:
+            file.write("4.00,1,2\n4.01,1")
+        np.testing.assert_array_equal(reader.read(infos)[0].values, whole[0].values)
 
 
 @pytest.mark.parametrize(
