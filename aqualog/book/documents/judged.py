@@ -120,7 +120,7 @@ DIAGNOSE = Document(
         obj("gain", "what the causes gain in the model; null without causes", (
             by_name("channel", "errors by residual", _ERRORS),
             number("heldout_log_score_gain", "nats",
-                   "gain over the better model without the causes: the file's, or with the car's likeliest values; null without held-out drives", null=True),
+                   "gain over the better model without the causes; null without held-out drives", null=True),
             interval("ci95", "nats", "95 % interval"),
             number("in_sample_log_score_gain", "nats", "gain on the diagnosed drives; null with held-out ones",
                    null=True),
