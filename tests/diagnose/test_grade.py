@@ -97,7 +97,7 @@ def test_without_torque_a_wandering_accelerometer_is_no_road(hilly):
 
 def test_a_road_too_small_to_be_named_is_a_note(hilly):
     _, _, found = hilly
-    small = replace(found, rms=Estimate(0.01, 0.009, 0.011, "rad"))
+    small = replace(found, rms=Estimate(0.0099, 0.009, 0.011, "rad"))
     silent = run._with_road(Outcome("no_effect", ()), small)
     assert (silent.verdict, silent.causes) == ("no_effect", ())
     assert "too small to be worth naming" in silent.notes[0]

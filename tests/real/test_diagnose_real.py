@@ -219,6 +219,17 @@ def test_hilly_trip_shows_its_road_and_the_withheld_elevation_agrees(real_logs, 
     assert after[kinematic, drive.mask].std() < 0.9 * r[kinematic, drive.mask].std()
 
 
+def test_a_road_of_one_percent_is_the_same_on_the_way_back(real_logs, bmw):
+    there, back = (looked(real_logs, bmw, t)[2] for t in ("A15", "A16"))
+    assert 0.009 < back.rms.value < there.rms.value < 0.011
+    length = min(there.theta.size, back.theta.size)
+    agree = [
+        np.corrcoef(there.theta[:length], np.roll(-back.theta[::-1][:length], lag))[0, 1] for lag in range(-80, 81)
+    ]
+    assert max(agree) > 0.65  # downhill is uphill on the way back
+    assert np.sort(agree)[-30] < 0.4
+
+
 def test_road_of_the_loaded_trip_is_flatter(real_logs, bmw):
     _, _, found = looked(real_logs, bmw, "B24")
     assert 0.005 < found.rms.low < found.rms.high < 0.012
