@@ -53,7 +53,8 @@ def measured_gain(
 
     `models`: as the file has it, the same at the car's likeliest values, and extended at its likeliest values. Errors
     fall from the first to the last; the log score is gained over the better of the first two, so that it is the
-    effects' alone. The likeliest values of one drive may let a wheel spin in another.
+    effects' alone. The likeliest values of one drive may let a wheel spin in another. Right effects gain half of what
+    they change squared, on average.
     `noise`: of the diagnosed drive after its best set, one measure for all models; `seed` of the bootstrap;
     `in_sample`: these are the diagnosed drives themselves. The channel `speed` is the error of a simulation that runs
     free for half a minute [m/s].
@@ -69,15 +70,20 @@ def measured_gain(
         then, now = ([_free_speed(d, m) for d in drives] for m in models[::2])
         channels.append(ChannelGain(SPEED, "m/s", math.nan, math.nan, *rms_of_both(then, now, masks)))
 
-    def scores_of(residuals: list[FloatArray]) -> list[FloatArray]:
-        own = [(d, bridged(r, d.mask), for_mask(noise, d.mask)) for d, r in zip(drives, residuals, strict=True)]
-        return [block_scores(whitened(r[None], n).reshape(r.shape), block_step(d.dt)) for d, r, n in own]
+    def unit(residuals: list[FloatArray]) -> list[FloatArray]:
+        own = [(r, bridged(r, d.mask), for_mask(noise, d.mask)) for d, r in zip(drives, residuals, strict=True)]
+        return [whitened(b[None], n).reshape(r.shape) for r, b, n in own]
 
-    before = max(scores_of(x), scores_of(alone), key=lambda own: sum(float(s.sum()) for s in own))
-    after = scores_of(y)
+    def scores_of(z: list[FloatArray]) -> list[FloatArray]:
+        return [block_scores(own, block_step(d.dt)) for d, own in zip(drives, z, strict=True)]
+
+    z = min(unit(x), unit(alone), key=lambda own: sum(float(np.square(a).sum()) for a in own))
+    extended = unit(y)
+    before, after = scores_of(z), scores_of(extended)
     won = log_score_gain(before, after, seed=seed)
+    promised = sum(0.5 * float(np.square(a - b).sum()) for a, b in zip(z, extended, strict=True))
     notes = scope(names, before, after, won, in_sample=in_sample)
-    return Gain(tuple(channels), *won, () if in_sample else names, in_sample, consequences, notes)
+    return Gain(tuple(channels), *won, () if in_sample else names, in_sample, consequences, notes, promised)
 
 
 def rms_of_both(

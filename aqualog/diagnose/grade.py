@@ -30,7 +30,7 @@ BIN_M = 25.0  # [m]
 OVER_M = 150.0  # [m] shorter waves are the car's pitching and the driver's pedal
 HALF_M = 200.0  # [m] wavelength of which the estimate keeps half
 FADES_M = 2000.0  # [m] from data the estimate falls to nothing
-# rms of a slope that is named: trips there and back show roads of 1.0 % alike, logged heights in steps of a metre do not
+# rms of a slope that is named: trips there and back show roads of 1 % alike, though heights in steps of a metre do not
 HILLY = 0.01
 OFTEN = 0.2  # share of drives on hilly roads (K)
 UNSURE = 0.8  # probability on one pass without torque: place and time cannot be distinguished (K)

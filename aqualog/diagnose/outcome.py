@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Container, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,29 +13,26 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
-from aqualog.diagnose.noise import Noise, bridged, whitened
 from aqualog.diagnose.records import SURE, Cause, Estimate, tempered
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import DOUBT, Found, Option, sharpened
 from aqualog.diagnose.sets import Members, fitted_in
+from aqualog.diagnose.shown import repeats
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, Causes, Outcome, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence, name_of
 from aqualog.model.term import Model
 
-__all__ = ["conclude", "repeats", "with_causes"]
+__all__ = ["conclude", "with_causes"]
 
 EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect explains it
-THIRDS = 3
-SEEN = 2.0  # standard deviations at which a third of the drive says something of a value
-_ORDINAL = ("the first", "the second", "the last")
 
 
 def conclude(found: Found, model: Model) -> Outcome[Option]:
     """The verdict on what a search found.
 
     An unknown form comes before any name; beside it stand the effects of the same set whose probability is 0.95 or
-    more. A name needs that probability too, and must pass the checks of `judge.repeats`. Else the answer is what the
+    more. A name needs that probability too, and must pass the checks of `shown.repeats`. Else the answer is what the
     posterior consists of, up to 0.95. Sets whose causes worth naming are the same count together. An only answer
     that is not named and leaves the channels larger than it finds them is noise.
     """
@@ -175,53 +172,3 @@ def with_causes(model: Model, causes: Sequence[Cause], asked: Sequence[Hypothesi
                 found.append((h, {n: values[n] for n in h.free}))
                 break
     return with_values(model, found)
-
-
-def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Container[str]) -> tuple[str, ...]:
-    """What speaks against naming some members of a refitted set, by their keys; empty if nothing does.
-
-    Each third of the drives that says something of a value must give it the same sign, and must be predicted better
-    with the values of the other two thirds than without the set. No value may stand at its physical bound.
-    """
-    off = refit.off
-    G, b = _by_third(refit, arena, noises)
-    prior = np.diag(np.array([h.parameter(n).sigma for h, n in refit.names]) ** -2.0)
-    out = []
-    total = 0.0
-    for t in range(THIRDS):
-        own = np.linalg.inv(G[t] + prior)
-        alone, sd = own @ b[t], np.sqrt(np.diag(own))
-        for k, (h, _) in enumerate(refit.names):
-            if (
-                h.key in names
-                and abs(off[k]) > SEEN * sd[k]
-                and alone[k] * off[k] < 0.0
-                and abs(alone[k]) > SEEN * sd[k]
-            ):
-                out.append(f"{name_of(h.effect.name, h.where)} has the other sign in {_ORDINAL[t]} third of the drive.")
-        rest = [o for o in range(THIRDS) if o != t]
-        others = np.linalg.solve(sum(G[o] for o in rest) + prior, sum(b[o] for o in rest))
-        total += float(2.0 * b[t] @ others - others @ G[t] @ others)
-    if total <= 0.0:
-        every = ", ".join(name_of(h.effect.name, h.where) for h in refit.members)
-        out.append(f"{every}: two thirds of the drive do not predict the other third better with it.")
-    if any(at and h.key in names for (h, _), at in zip(refit.names, refit.bounded, strict=True)):
-        out.append("a value stands at its physical bound.")
-    return tuple(out)
-
-
-def _by_third(
-    refit: Refit, arena: Arena, noises: Sequence[Noise]
-) -> tuple[list[FloatArray], list[FloatArray]]:  # fmt: skip
-    """Inner products of the set's signatures, and theirs with the residual before it, by thirds of the used time."""
-    k = len(refit.off)
-    G, b = [np.zeros((k, k)) for _ in range(THIRDS)], [np.zeros(k) for _ in range(THIRDS)]
-    for part, noise in zip(arena.parts, noises, strict=True):
-        own = np.concatenate([refit.signatures[part.drive], refit.before(part.drive)[None]])[..., part.at]
-        rows = whitened(bridged(own, part.mask), noise).reshape(own.shape)
-        third = np.minimum(THIRDS * np.cumsum(part.mask) // max(int(part.mask.sum()), 1), THIRDS - 1)
-        for t in range(THIRDS):
-            x = rows[..., third == t].reshape(k + 1, -1)
-            G[t] += x[:k] @ x[:k].T
-            b[t] += x[:k] @ x[k]
-    return G, b

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -213,7 +214,8 @@ class Consequence:
 class Gain:
     """Gain of the extended model. `log_score` on held-out drives with its 95 % interval, in nats (natural logarithm).
 
-    `heldout` names them; empty: the gain is on the diagnosed drives themselves (`in_sample`).
+    `heldout` names them; empty: the gain is on the diagnosed drives themselves (`in_sample`). `promised`: what the
+    effects would gain there on average if they and their values were right, NaN where it was not computed. [nats]
     """
 
     channels: tuple[ChannelGain, ...]
@@ -224,6 +226,7 @@ class Gain:
     in_sample: bool
     consequences: tuple[Consequence, ...] = ()
     notes: tuple[str, ...] = ()
+    promised: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
 from aqualog.diagnose.sets import fitted_in
+from aqualog.diagnose.shown import silent
 from aqualog.diagnose.steps import moments
 from aqualog.diagnose.subsets import compatible, imitations
 from aqualog.diagnose.threads import beside
@@ -255,7 +256,19 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
             return None
         return Option(members, _evidence(arena, found, own, measure, nothing), found)
 
-    done = dict(zip(chosen, beside(one, chosen), strict=True))
+    done: dict[Members, Option | None] = dict(zip(chosen, beside(one, chosen), strict=True))
+    # an effect that does not show where it acts is out of every set; what remains may stand, if all of it shows
+    noises, absent = [w.noise for w in posterior.weighings], set[str]()
+    for m, o in [*done.items()]:
+        if o is not None and o.refit is not None and (names := silent(o.refit, arena, noises)):
+            absent |= names
+            done[m] = None
+            rest = tuple(b for b in m if arena.name(b) not in names)
+            if rest and rest not in done:
+                left = one(rest)
+                done[rest] = (
+                    left if left is None or left.refit is None or not silent(left.refit, arena, noises) else None
+                )
     within = {}  # the members of a refitted set that are not at a physical bound; all of them if each of them is
     for m, o in done.items():
         if o is not None and o.refit is not None:
@@ -270,7 +283,8 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     if best in out and best:
         # what the simulator says more or less of the best set than its signatures, it would say of the others too
         shift = out[best].evidence - linear[best]
-        out |= {m: Option(m, e + shift) for m, e in linear.items() if m not in done and m}
+        others_of = {m: e for m, e in linear.items() if m not in done and m}
+        out |= {m: Option(m, e + shift) for m, e in others_of.items() if not absent & {arena.name(b) for b in m}}
     # of several effects one at its physical bound stands for what no effect is: the set counts as its other effects
     beyond = {b for m, kept in within.items() for b in set(m) - set(kept)}
     for m, kept in within.items():

@@ -1,14 +1,18 @@
 """What speaks against a name, and probabilities."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import fit_noise
-from aqualog.diagnose.outcome import repeats
 from aqualog.diagnose.records import tempered
 from aqualog.diagnose.refit import Refit
+from aqualog.diagnose.shown import repeats, silent
+from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
-from tests.diagnose.test_unexplained import arena
+from tests.diagnose.test_unexplained import arena, slow
 
 
 def speaking(a, value, before, names, *, at_bound=False):
@@ -38,6 +42,31 @@ def test_a_value_at_its_bound_is_no_name():
     key = a.evidence.asked[0].key
     assert speaking(a, 0.4, before, {key}, at_bound=True) == ("a value stands at its physical bound.",)
     assert speaking(a, 0.4, before, {"another"}, at_bound=True) == speaking(a, 0.4, before, {key}) == ()
+
+
+@pytest.mark.parametrize(
+    ("effect", "where", "shows", "out"),
+    [
+        ("slip_stiffness", "r", (1.0, 1.0), False),
+        ("slip_stiffness", "r", (1.0, 0.0), True),  # a fast movement that the simulator has otherwise
+        ("accelerometer_gain", "a_x", (1.0, 0.0), False),
+        ("accelerometer_gain", "a_x", (0.0, 0.0), True),
+    ],
+)
+def test_an_effect_shows_where_it_acts(effect, where, shows, out):
+    h, rng = Hypothesis(EFFECTS[effect], where, ("gain",)), np.random.default_rng(5)
+    signature, mask = slow(rng.standard_normal((2400, 2)), 0.9).T[None], np.ones(2400, dtype=bool)
+    noise = 0.5 * rng.standard_normal((2, 2400))
+    drive = SimpleNamespace(channels=("kinematic", "slip_rl"))
+    a = SimpleNamespace(
+        evidence=SimpleNamespace(drives=[drive]), parts=[SimpleNamespace(drive=0, at=slice(None), mask=mask)]
+    )
+    # where it does not show, the other channel of a wrong set is worse with it
+    left = noise + (np.array(shows) - 1.0)[:, None] * 0.3 * signature[0]
+    off = np.array([0.3])
+    refit = Refit((h,), 1.0 + off, off, np.eye(1), 0.0, Model(), (left,), (signature,), (False,))
+    found = silent(refit, a, [fit_noise(noise, mask, np.eye(2))])
+    assert found == (frozenset({effect}) if out else frozenset())
 
 
 def test_probabilities_rise_with_the_share_of_the_posterior():

@@ -34,7 +34,7 @@ def slow(x, keep):
     """First-order low-pass of unit variance for white noise of unit variance."""
     y = np.empty_like(x)
     y[0] = x[0]
-    for i in range(1, x.size):
+    for i in range(1, len(x)):
         y[i] = keep * y[i - 1] + np.sqrt(1.0 - keep * keep) * x[i]
     return y
 

@@ -94,7 +94,7 @@ GAIN = Gain(
         Consequence("resistance", 12, 1, 84.2, 0.421, 0.402, 38, 38, 40),
         Consequence("joint_cusum", 0, 0, 84.2, None, None, 40, 40, 40),
     ),
-    ("The intervals treat a drive as the unit.",),
+    ("The intervals treat a drive as the unit.",), 790.0,
 )  # fmt: skip
 AGREED = Agreement(
     "payload_mass", "delta_mass",

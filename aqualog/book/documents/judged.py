@@ -122,6 +122,8 @@ DIAGNOSE = Document(
             number("heldout_log_score_gain", "nats",
                    "gain over the better model without the causes; null without held-out drives", null=True),
             interval("ci95", "nats", "95 % interval"),
+            number("promised_log_score_gain", "nats", "mean gain there if the causes and their values are right; null "
+                   "where it was not computed", null=True),
             number("in_sample_log_score_gain", "nats", "gain on the diagnosed drives; null with held-out ones",
                    null=True),
             interval("in_sample_ci95", "nats", "95 % interval"),

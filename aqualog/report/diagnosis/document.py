@@ -142,6 +142,7 @@ def _gain(g: Gain) -> dict[str, Any]:
         },
         "heldout_log_score_gain": None if g.in_sample else score,
         "ci95": nothing if g.in_sample else interval,
+        "promised_log_score_gain": plain(g.promised),
         "in_sample_log_score_gain": score if g.in_sample else None,
         "in_sample_ci95": interval if g.in_sample else nothing,
         "unit": "nats",

@@ -246,7 +246,10 @@ def _score(g: Mapping[str, Any] | None) -> list[str]:
     if low is not None and low <= 0.0:
         return [f"{where} the log score changes by {short(score)} {unit}{interval}: no measurable gain."]
     change = "rises" if score >= 0.0 else "falls"
-    return [f"{where} the log score {change} by {short(abs(score))} {unit}{interval}."]
+    promised = (
+        f"; right causes of these sizes gain {short(p)} on average" if (p := g["promised_log_score_gain"]) else ""
+    )
+    return [f"{where} the log score {change} by {short(abs(score))} {unit}{interval}{promised}."]
 
 
 def _channels(document: Mapping[str, Any]) -> tuple[list[str], list[str]]:
