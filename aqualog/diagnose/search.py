@@ -269,12 +269,12 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
                 done[rest] = (
                     left if left is None or left.refit is None or not silent(left.refit, arena, noises) else None
                 )
-    within = {}  # the members of a refitted set that are not at a physical bound; all of them if each of them is
+    within = {}  # the members of a refitted set that are not at a physical bound
     for m, o in done.items():
         if o is not None and o.refit is not None:
             at_bound = [h for (h, _), is_at in zip(o.refit.names, o.refit.bounded, strict=True) if is_at]
-            within[m] = tuple(b for b in m if evidence.asked[arena.blocks[b].tag] not in at_bound) or m
-    smaller = [m for m in dict.fromkeys(within.values()) if m not in done]
+            within[m] = tuple(b for b in m if evidence.asked[arena.blocks[b].tag] not in at_bound)
+    smaller = [m for m in dict.fromkeys(within.values()) if m and m not in done]
     done |= dict(zip(smaller, beside(one, smaller), strict=True))
     # water is not linear: without any effect, the simulator may differ from what signatures say of it
     y = measure.rows([residual(d, model)[None] for d in evidence.drives])
@@ -288,7 +288,7 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     # of several effects one at its physical bound stands for what no effect is: the set counts as its other effects
     beyond = {b for m, kept in within.items() for b in set(m) - set(kept)}
     for m, kept in within.items():
-        if kept in out and out[kept].evidence < out[m].evidence:
+        if kept and kept in out and out[kept].evidence < out[m].evidence:
             out[kept] = replace(out[kept], evidence=out[m].evidence, beyond=tuple(b for b in m if b not in kept))
     out = {m: o for m, o in out.items() if (within.get(m, m) == m if o.refit else not beyond & set(m))}
     return _levelled(evidence, arena, out, within.get(best, best), equal)

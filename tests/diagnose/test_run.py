@@ -86,6 +86,7 @@ def test_a_set_with_a_value_at_its_bound_counts_as_its_other_effects(monkeypatch
     d = told(term("payload_mass", delta_mass=300.0), term("tyre_radius", "fl", delta=-0.015))
     assert (d.verdict, keys(d)) == ("named", {"payload_mass"})
     assert any(n.startswith("Not named: tyre radius (front left wheel) would stand") for n in d.notes)
+    assert "tyre_radius" not in {c.effect for c in told(term("tyre_radius", "fl", delta=-0.015)).causes}
 
 
 def test_compound():
