@@ -206,13 +206,21 @@ def test_pieces_are_the_whole(tmp_path, monkeypatch):
         tmp_path / "a.mf4", [group], Layout((4200, 4201, 6300, 12600), (None, None, None, "deflate"))
     )
     with MdfReader(path, ReadOptions()) as r:
-        pieces = list(columns.raw_pieces(path, r._groups[0], [1, 2], 100))
+        pieces = list(columns.raw_pieces(path, r._groups[0], [1, 2], 100, {1}))
         whole = raw_columns(path, r._groups[0], [1, 2])
     assert len(pieces) > 5
+    assert {p.samples[1].dtype for p in pieces} == {np.dtype(np.float64)}
     for i in (1, 2):
         np.testing.assert_array_equal(np.concatenate([p.samples[i] for p in pieces]), whole.samples[i])
     np.testing.assert_array_equal(np.concatenate([p.invalid[1] for p in pieces]), whole.invalid[1])
     assert list(whole.invalid) == [1]
+
+
+def test_a_channel_is_scaled_once_however_often_it_is_asked_for(tmp_path):
+    path = written(tmp_path / "a.mf4", [(50, [("<f8", CONVERSIONS[1])])], compression=0, rng=np.random.default_rng(1))
+    with MdfReader(path, ReadOptions()) as r:
+        once, twice = (r.read([*r.channels()] * k) for k in (1, 2))
+    assert [c.values.tolist() for c in twice] == [c.values.tolist() for c in once] * 2
 
 
 @pytest.mark.parametrize("library", ["libdeflate", "zlib"])
