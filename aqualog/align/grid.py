@@ -40,13 +40,16 @@ class Placed(NamedTuple):
     """Positions of the points (m,) of a grid among stamps (n,).
 
     `right` (m,): the first stamp that is not before the point, n behind the last; `exact` (m,): it is at the point;
-    `between`: indices (k,) of the points with a stamp on either side, `span` (k,) the interval there [ns], and `share`
-    (k,) how much of it lies before the point.
+    `between`: indices (k,) of the points with a stamp on either side, `before` and `after` (k,) those of the stamps,
+    `span` (k,) the interval there [ns], and `share` (k,) how much of it lies before the point. Indices that go up by
+    one are a slice: what it takes is no copy.
     """
 
     right: TimeArray
     exact: BoolArray
-    between: TimeArray
+    between: TimeArray | slice
+    before: TimeArray | slice
+    after: TimeArray | slice
     span: TimeArray
     share: FloatArray
 
@@ -63,14 +66,21 @@ def placed(t_ns: TimeArray, grid_ns: TimeArray, dt_ns: int | None = None) -> Pla
         right = np.cumsum(np.bincount(step, minlength=m + 1)[:m])
     else:
         right = np.searchsorted(t_ns, grid_ns, side="left")
-    exact = (right < n) & (t_ns[np.minimum(right, n - 1)] == grid_ns)
-    between = np.flatnonzero(~exact & (right > 0) & (right < n))
-    i = right[between]
-    before = t_ns[i - 1]
-    span = t_ns[i] - before
+    exact = (right < n) & (t_ns.take(right, mode="clip") == grid_ns)
+    between = _indices(np.flatnonzero(~exact & (right > 0) & (right < n)))
+    after = _indices(right[between])
+    before = slice(after.start - 1, after.stop - 1) if isinstance(after, slice) else after - 1
+    low = t_ns[before]
+    span = t_ns[after] - low
     # integers are subtracted before they become floats: epoch nanoseconds do not fit a double
-    share = (grid_ns[between] - before).astype(np.float64) / span.astype(np.float64)
-    return Placed(right, exact, between, span, share)
+    share = (grid_ns[between] - low).astype(np.float64) / span.astype(np.float64)
+    return Placed(right, exact, between, before, after, span, share)
+
+
+def _indices(i: TimeArray) -> TimeArray | slice:
+    """A slice of indices (k,) that do not go down, if they go up by one each."""
+    is_run = i.size and i[-1] - i[0] == i.size - 1 and (i[1:] > i[:-1]).all()
+    return slice(int(i[0]), int(i[-1]) + 1) if is_run else i
 
 
 def linear(
@@ -92,12 +102,21 @@ def linear(
     bridged = np.zeros(grid_ns.size, dtype=bool)
     if t_ns.size == 0:
         return np.full(grid_ns.size, np.nan), bridged
-    right, exact, between, span, share = at or placed(t_ns, grid_ns)
-    y = np.where(exact, x.take(right, mode="clip"), np.nan)
-    i = right[between]
-    values = x[i - 1] + share * (x[i] - x[i - 1])
-    y[between] = np.where(span <= gap_ns, values, np.nan)
-    bridged[between] = span > 1.5 * (median_period_ns(t_ns) if period_ns is None else period_ns)
+    right, exact, between, before, after, span, share = at or placed(t_ns, grid_ns)
+    if not span.size and t_ns.size == grid_ns.size and exact.all():  # the stamps are the grid
+        return x.copy(), bridged
+    y = np.where(exact, x.take(right, mode="clip"), np.nan) if exact.any() else np.full(grid_ns.size, np.nan)
+    low = x[before]
+    values = np.subtract(x[after], low, out=y[between] if isinstance(between, slice) else None)
+    values *= share
+    values += low
+    longest = span.max(initial=0)
+    if longest > gap_ns:
+        values[span > gap_ns] = np.nan
+    if not isinstance(between, slice):
+        y[between] = values
+    if longest > (least := 1.5 * (median_period_ns(t_ns) if period_ns is None else period_ns)):
+        bridged[between] = span > least
     return y, bridged
 
 

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["batch", "bin_resistance", "bin_slipslope", "campaign_app", "init", "plan", "report"]
 
-_AHEAD = ("aqualog.detect.stream", "aqualog.io.mdf.reader", "aqualog.align.lines")  # half of what a worker imports
+# half of what a worker imports, and the machine code of that
+_AHEAD = ("aqualog.detect.stream", "aqualog.io.mdf.reader", "aqualog.align.lines", "aqualog.campaign.ahead")
 
 campaign_app = typer.Typer(
     help="Campaign files: many drives in known configurations.", no_args_is_help=True, rich_markup_mode=None

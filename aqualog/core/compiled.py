@@ -19,7 +19,7 @@ from numba.core.runtime import rtsys
 
 from aqualog.core.user_folders import code_folder
 
-__all__ = ["compiled", "inlined", "kept_code", "part"]
+__all__ = ["compiled", "inlined", "kept_code", "load_kept", "part"]
 
 _PATIENCE_S = 120.0  # the longest compilation takes a quarter of it on a slow machine
 _LOOK_S = 0.05
@@ -28,6 +28,7 @@ _LOOK_S = 0.05
 _UNCOUNTED: dict[str, bool] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 
 _inlined: dict[FunctionType, Any] = {}
+_kept: list[Any] = []  # functions whose machine code is kept
 
 
 def compiled(function: Callable[..., Any]) -> Any:
@@ -55,6 +56,7 @@ def compiled(function: Callable[..., Any]) -> Any:
     if hasattr(index, "_source_stamp"):  # numba's own attribute: without it, its own rule holds
         assert isinstance(function, FunctionType)
         index._source_stamp = (index._source_stamp, _stamp_of(function))
+        _kept.append(dispatcher)
     return dispatcher
 
 
@@ -75,6 +77,16 @@ def kept_code() -> frozenset[tuple[str, int]]:
         with suppress(OSError):  # another process has put a newer one in its place
             found.add((str(path), path.stat().st_mtime_ns))
     return frozenset(found)
+
+
+def load_kept() -> None:
+    """Load what is kept of the functions so far that no other one calls: processes forked from this one have it."""
+    called = {id(f) for d in _kept for f in map(d.py_func.__globals__.get, d.py_func.__code__.co_names)}
+    for dispatcher in _kept:
+        if id(dispatcher) not in called:
+            with suppress(Exception):  # numba's own attributes, or a damaged file: each process loads it by itself
+                for signature, *_ in dispatcher._cache._cache_file._load_index():
+                    dispatcher.compile(signature)
 
 
 def inlined(function: Callable[..., Any]) -> Any:

@@ -48,18 +48,9 @@ class Allowance:
 
 
 def unpack(data: bytes, compression: str, size: int, allowance: Allowance) -> bytes:
-    """Decompress a block to its declared size and not a byte further.
+    """Decompress a block to its declared size [byte] and not a byte further.
 
-    Parameters
-    ----------
-    data : bytes
-        Compressed block.
-    compression : str
-        `zstd`, `lz4`, `bz2`, or empty or `none` for plain bytes.
-    size : int
-        Declared size. [byte]
-    allowance : Allowance
-        Of the file that it stands in.
+    `compression`: `zstd`, `lz4`, `bz2`, or empty or `none` for plain bytes. `allowance`: of the file it stands in.
 
     Raises
     ------

@@ -36,12 +36,12 @@ def made_mf4(path: Path, *, records: int, channels: int, compression: int) -> Pa
     return path
 
 
-def read_by_aqualog(path: Path, names: list[str]) -> list[tuple[np.ndarray, np.ndarray]]:
+def read_by_aqualog(path: Path, names: list[str], threads: int = 1) -> list[tuple[np.ndarray, np.ndarray]]:
     """Time stamps and values of channels, by the reader of the package."""
     from aqualog.io.mdf.reader import MdfReader
     from aqualog.io.reader import ReadOptions
 
-    with MdfReader(path, ReadOptions()) as reader:
+    with patch.dict(os.environ, POLARS_MAX_THREADS=str(threads)), MdfReader(path, ReadOptions()) as reader:
         wanted = {c.name: c for c in reader.channels()}
         return [(c.t_ns, c.values) for c in reader.read([wanted[n] for n in names])]
 
@@ -54,10 +54,22 @@ def read_by_asammdf(path: Path, names: list[str]) -> list[tuple[np.ndarray, np.n
         return [(s.timestamps, s.samples) for s in file.select([(n, None, None) for n in names])]
 
 
+def placed_on_one_clock(found: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+    """Channels in the middle between the first one's time stamps, as the package puts them on a grid."""
+    from aqualog.align.grid import linear, median_period_ns, placed
+    from aqualog.align.timebase import OfLast
+
+    first = found[0][0]
+    clock, period = first[:-1] + np.diff(first) // 2, median_period_ns(first)
+    place = OfLast(lambda t: placed(t, clock))
+    return [linear(t, x, clock, gap_ns=5 * period, period_ns=period, at=place(t))[0] for t, x in found]
+
+
 def on_one_clock(found: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
-    """Channels on the first one's time stamps."""
-    grid = found[0][0]
-    return [np.interp(grid, t, x) for t, x in found]
+    """The same by NumPy."""
+    first = found[0][0]
+    clock = first[:-1] + 0.5 * np.diff(first)
+    return [np.interp(clock, t, x) for t, x in found]
 
 
 def inflated(path: Path) -> int:
@@ -101,14 +113,14 @@ def mf4_rows(folder: Path, scale: Scale) -> list[Row]:
 
 def _wide_row(path: Path, wide: list[str], name: str) -> Row:
     return Row(
-        name, "asammdf select + interp", 2.5, lambda: on_one_clock(_read_with_threads(path, wide)),
+        name, "asammdf select + interp", 2.5, lambda: placed_on_one_clock(read_by_aqualog(path, wide)),
         lambda: on_one_clock(read_by_asammdf(path, wide)), unlike, conditions=f"{_size(path)}, warm, one thread",
     )  # fmt: skip
 
 
 def _wide_rows(path: Path, wide: list[str], channels: int, layout: str) -> list[Row]:
     def ours(count: int = 1) -> list[np.ndarray]:
-        return on_one_clock(_read_with_threads(path, wide, count))
+        return placed_on_one_clock(read_by_aqualog(path, wide, count))
 
     def peer() -> list[np.ndarray]:
         return on_one_clock(read_by_asammdf(path, wide))
@@ -118,7 +130,7 @@ def _wide_rows(path: Path, wide: list[str], channels: int, layout: str) -> list[
     return [
         _wide_row(path, wide, f"MF4, {len(wide)} of {channels} channels, {layout}"),
         Row(
-            f"same, {layout}, without interpolation", "asammdf select", 2.5, lambda: _read_with_threads(path, wide),
+            f"same, {layout}, without interpolation", "asammdf select", 2.5, lambda: read_by_aqualog(path, wide),
             lambda: read_by_asammdf(path, wide), lambda a, b: unlike([x for _, x in a], [x for _, x in b]),
             conditions=one,
         ),
@@ -132,11 +144,6 @@ def _wide_rows(path: Path, wide: list[str], channels: int, layout: str) -> list[
             peer, conditions=limit, needs=("deflate",),
         ),
     ]  # fmt: skip
-
-
-def _read_with_threads(path: Path, names: list[str], count: int = 1) -> list[tuple[np.ndarray, np.ndarray]]:
-    with patch.dict(os.environ, POLARS_MAX_THREADS=str(count)):
-        return read_by_aqualog(path, names)
 
 
 def _size(path: Path) -> str:

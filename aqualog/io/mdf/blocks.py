@@ -152,18 +152,9 @@ _LARGEST_XML = 1 << 20
 
 
 class BlockError(Exception):
-    """A block that cannot be read.
+    """A block that cannot be read: its kind as MDF names it (`CG`), where it is or should be [bytes], what is wrong.
 
-    Parameters
-    ----------
-    kind : str
-        Of the block, as MDF names it (`CG`).
-    at : int
-        Where it is, or should be. [bytes]
-    why : str
-        What is wrong with it.
-    is_cut : bool
-        Whether the file ends before it does.
+    `is_cut`: whether the file ends before it does.
     """
 
     def __init__(self, kind: str, at: int, why: str, *, is_cut: bool = False) -> None:
@@ -208,13 +199,7 @@ class Survey:
 
 
 class Walk:
-    """The file, what is found, and which blocks were seen.
-
-    Parameters
-    ----------
-    data : bytes or mmap
-    path : Path
-    """
+    """The file, bytes or mmap, what is found, and which blocks were seen."""
 
     def __init__(self, data: Any, path: Path) -> None:
         self._data, self._path, self._size = data, path, len(data)

@@ -11,7 +11,7 @@ import os
 import zlib
 from array import array
 from collections import defaultdict, deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -34,7 +34,7 @@ __all__ = [
 ]  # fmt: skip
 
 _LARGEST_BLOCK = 1 << 28  # [bytes] stored or unpacked; the standard allows 4 MiB
-_PIECE = 1 << 21  # [bytes] read at a time where nothing is packed: what the cache still holds when it is cut
+_PIECE = 5 << 20  # [bytes] read at a time where nothing is packed: in the cache when it is cut; a room of huge pages
 _WHOLE_BITS = {"u": (8, 16, 32, 64), "i": (8, 16, 32, 64), "f": (16, 32, 64)}
 
 _Array = NDArray[Any]
@@ -65,6 +65,7 @@ class _Plan(NamedTuple):
     """Fields of the wanted channels, places of invalidation bits (byte, bit), blocks, size of a record. [bytes]"""
 
     fields: Mapping[int, Field]
+    floats: Sequence[int]  # channels whose samples become float64 as they are taken out
     invalid: Mapping[int, tuple[int, int]]
     blocks: Sequence[_Block]
     size: int
@@ -81,18 +82,13 @@ def is_sound_field(field: Field, size: int) -> bool:
     return field.octets <= 8
 
 
-def raw_pieces(path: Path, group: Group, wanted: Sequence[int], records: int) -> Iterator[Raw]:
+def raw_pieces(
+    path: Path, group: Group, wanted: Sequence[int], records: int, floats: Collection[int] = ()
+) -> Iterator[Raw]:
     """Raw samples of channels of a group, none of them virtual, in pieces of whole blocks, in order.
 
-    Parameters
-    ----------
-    path : Path
-        The file with the records.
-    group : Group
-    wanted : sequence of int
-        Channels of the group.
-    records : int
-        Least number of records of a piece but for the last one.
+    `records`: least number of records of a piece but for the last one. `floats`: channels whose numbers become float64
+    at once, so that their raw samples take no memory.
 
     Raises
     ------
@@ -105,11 +101,12 @@ def raw_pieces(path: Path, group: Group, wanted: Sequence[int], records: int) ->
     fields = {i: group.channels[i].field for i in wanted}
     bits = {i: b for i in wanted if (b := group.channels[i].invalidation_bit) is not None}
     invalid = {i: (group.size + b // 8, b % 8) for i, b in bits.items()}
+    floats = [i for i in fields if i in floats]
     blocks = None if group.invalid_data else _blocks(group.data, size, group.cycles)
     if blocks is None:
-        yield from _streamed(path, _Plan(fields, invalid, (), size), group, records)
+        yield from _streamed(path, _Plan(fields, floats, invalid, (), size), group, records)
         return
-    plan = _Plan(fields, invalid, blocks, size)
+    plan = _Plan(fields, floats, invalid, blocks, size)
     for run in _runs(blocks, size, records):
         raw = _decoded(path, plan, run)
         count = group.cycles - raw.first
@@ -220,9 +217,11 @@ def _decoded(path: Path, plan: _Plan, blocks: Sequence[_Block]) -> Raw:
     pending = deque(blocks)
     longest = max(sum(p.size for p in b.parts) for b in blocks)
 
+    @np.errstate(all="ignore")  # as where it was called: a thread has a state of its own
     def work() -> None:
         # one room for all blocks: pages of memory that are fresh for each cost as much as reading them
         room = np.empty(longest, dtype=np.uint8).data
+        in_room = None if all(b.parts[0].packing for b in blocks) else _views(plan, room)
         try:
             with path.open("rb", buffering=0) as file:
                 while pending:
@@ -230,10 +229,12 @@ def _decoded(path: Path, plan: _Plan, blocks: Sequence[_Block]) -> Raw:
                         block = pending.popleft()
                     except IndexError:  # another thread took the last one
                         return
-                    data = _unpacked(_stored(file, block.parts, room), block.parts[0])
+                    kind = block.parts[0]
+                    data = _unpacked(_stored(file, block.parts, room), kind)
                     if len(data) != block.size:
                         raise OSError(f"a data block inflates to {len(data)} bytes, not {block.size}")
-                    _fill(out, plan, block.first - begin, data, is_transposed=block.parts[0].columns > 0)
+                    views = None if kind.packing else in_room
+                    _fill(out, plan, block.first - begin, data, is_transposed=kind.columns > 0, views=views)
         except BaseException:
             pending.clear()  # the other threads need not go on
             raise
@@ -278,12 +279,14 @@ def _streamed(path: Path, plan: _Plan, group: Group, records: int) -> Iterator[R
 
 
 def _empty(plan: _Plan, first: int, count: int) -> Raw:
-    return Raw(
-        {i: np.empty((count, f.octets) if f.letter == "V" else count, dtype=_dtype(f)) for i, f in plan.fields.items()},
-        {i: np.empty(count, dtype=np.bool_) for i in plan.invalid},
-        first,
-        count,
-    )
+    samples: dict[int, _Array] = {
+        i: np.empty((count, f.octets) if f.letter == "V" else count, dtype=_dtype(f))
+        for i, f in plan.fields.items()
+        if i not in plan.floats
+    }
+    # one array for all of them, of huge pages where there are many: most of the time would be spent on small ones
+    samples |= zip(plan.floats, np.empty((len(plan.floats), count)), strict=True)
+    return Raw(samples, {i: np.empty(count, dtype=np.bool_) for i in plan.invalid}, first, count)
 
 
 def _dtype(field: Field) -> np.dtype[Any]:
@@ -357,26 +360,37 @@ def _turned_back(data: _Bytes, columns: int) -> bytes:
     return octets[:whole].reshape(columns, -1).T.tobytes() + octets[whole:].tobytes()
 
 
-def _fill(out: Raw, plan: _Plan, first: int, data: _Bytes, *, is_transposed: bool) -> None:
+def _views(plan: _Plan, data: _Bytes) -> dict[int, _Array]:
+    """Samples where they stand in whole records, of the channels whose type NumPy has."""
     n = len(data) // plan.size
+    return {i: np.ndarray((n,), _dtype(f), data, f.at, (plan.size,)) for i, f in plan.fields.items() if _is_whole(f)}
+
+
+def _fill(
+    out: Raw, plan: _Plan, first: int, data: _Bytes, *, is_transposed: bool, views: dict[int, _Array] | None = None
+) -> None:
+    """Put the samples of a block at their place; `views` as `_views` has them, if they are known."""
+    n = len(data) // plan.size
+    if views is None:
+        views = {} if is_transposed else _views(plan, data)
     rows = slice(first, first + n)
     octets = np.frombuffer(data, dtype=np.uint8)
     planes = octets.reshape(plan.size, n) if is_transposed else octets.reshape(n, plan.size).T
     for i, f in plan.fields.items():
-        here = out.samples[i][rows]
-        if f.letter == "V":
-            here[:] = planes[f.at : f.at + f.octets].T
-        elif _is_whole(f) and not is_transposed:
-            here[:] = np.ndarray((n,), here.dtype, data, f.at, (plan.size,))
+        if i in views:
+            out.samples[i][rows] = views[i][:n]
+        elif f.letter == "V":
+            out.samples[i][rows] = planes[f.at : f.at + f.octets].T
         else:
-            _gather(here, f, planes)
+            out.samples[i][rows] = _gathered(f, planes)
     for i, (at, bit) in plan.invalid.items():
         out.invalid[i][rows] = planes[at] >> bit & 1
 
 
-def _gather(here: _Array, f: Field, planes: NDArray[np.uint8]) -> None:
+def _gathered(f: Field, planes: NDArray[np.uint8]) -> _Array:
     """Samples out of the bytes of which they are made; `planes[k]` is byte k of each record."""
-    width = here.dtype.itemsize
+    width = _dtype(f).itemsize
+    here = np.empty(planes.shape[1], _dtype(f))
     into = here.view(np.uint8).reshape(-1, width)
     is_turned = f.is_big_endian and not _is_whole(f)  # what is no whole number of bytes is made little-endian
     for k in range(f.octets):
@@ -385,6 +399,7 @@ def _gather(here: _Array, f: Field, planes: NDArray[np.uint8]) -> None:
         # the highest bit to the top, then the lowest to the bottom: spreads the sign, and whatever lay above is gone
         here <<= 8 * width - f.shift - f.bits
         here >>= 8 * width - f.bits
+    return here
 
 
 # --- records of several kinds in a row ---

@@ -17,7 +17,7 @@ from aqualog.core.errors import LogError
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.io.mdf.blocks import Conversion
 
-__all__ = ["Formula", "converted", "physical", "refusal"]
+__all__ = ["Formula", "converted", "physical", "refusal", "takes_floats"]
 
 _Array = NDArray[Any]
 
@@ -115,11 +115,11 @@ def _nested(conversion: Conversion) -> list[Conversion]:
     return found
 
 
-def physical(conversion: Conversion | None, raw: _Array) -> FloatArray:
+def physical(conversion: Conversion | None, raw: _Array, *, is_free: bool = False) -> FloatArray:
     """Apply a conversion that `refusal` has no objection to, in double precision.
 
     A table of texts leaves the number as it is; where some entries are texts (`error`) and the others numbers, a
-    sample that is a text is NaN.
+    sample that is a text is NaN. `is_free`: nobody needs the raw samples any more, which may be changed.
     """
     if conversion is None:
         return raw.astype(np.float64, copy=False)
@@ -127,15 +127,27 @@ def physical(conversion: Conversion | None, raw: _Array) -> FloatArray:
         return _of_ranges(conversion, raw)
     if conversion.kind in ("texts", "texts of ranges"):
         return _of_texts(conversion, raw) if _nested(conversion) else raw.astype(np.float64)
-    return np.asarray(converted(conversion, raw.astype(np.float64)), dtype=np.float64)
+    x = raw.astype(np.float64, copy=not is_free)
+    return np.asarray(converted(conversion, x, into=x), dtype=np.float64)
 
 
-def converted(conversion: Conversion, x: _Array) -> _Array:
-    """Apply a conversion by a formula or between points, in the precision of the samples."""
+def takes_floats(conversion: Conversion | None) -> bool:
+    """Whether raw samples may become float64 before `physical`: a table asks for the numbers as the file has them."""
+    return conversion is None or conversion.kind not in ("ranges", "texts", "texts of ranges")
+
+
+def converted(conversion: Conversion, x: _Array, into: _Array | None = None) -> _Array:
+    """Apply a conversion by a formula or between points, in the precision of the samples.
+
+    `into`: where the values may stand, which may be the samples; fresh memory costs more than a line.
+    """
     p = conversion.numbers
     match conversion.kind:
         case "linear":
-            return x if (p[1], p[0]) == (1, 0) else x * p[1] + p[0] if p[0] else x * p[1]
+            if (p[1], p[0]) == (1, 0):
+                return x
+            y = np.multiply(x, p[1], out=into)
+            return np.add(y, p[0], out=y) if p[0] else y
         case "rational":
             return _rational(p, x)
         case "polynomial":

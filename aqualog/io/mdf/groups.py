@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,7 +19,7 @@ from aqualog.core.records import BoolArray, ChannelInfo, TimeArray
 from aqualog.guard.system import bytes_text, free_memory
 from aqualog.io.mdf.blocks import Group, Survey, mapped
 from aqualog.io.mdf.columns import Kind, Raw, raw_pieces, sorted_groups
-from aqualog.io.mdf.conversion import converted, physical
+from aqualog.io.mdf.conversion import converted, physical, takes_floats
 from aqualog.io.mdf.walk3 import survey3
 from aqualog.io.mdf.walk4 import survey4
 from aqualog.io.reader import OpenFile
@@ -37,13 +37,7 @@ _LATEST_S = 9.0e9  # int64 nanoseconds end in the year 2262
 
 
 class GroupReader(OpenFile):
-    """One open file and what was lost of it.
-
-    Parameters
-    ----------
-    path : Path
-        The file; only ever read.
-    """
+    """One open file, only ever read, and what was lost of it."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -167,22 +161,24 @@ class GroupReader(OpenFile):
         assert clock is not None
         master = self._groups[clock].master
         assert master is not None
+        conversions = {i: self._groups[index].channels[i].conversion for i in wanted}
+        floats = {i for i, conversion in conversions.items() if takes_floats(conversion)}
         if clock == index:
-            for raw in self._raw(index, [*wanted, master], records):
+            for raw in self._raw(index, [*wanted, master], records, floats - {master}):
                 yield self._times(clock, raw.samples[master]), self._values(index, wanted, raw)
             return
         t = np.concatenate([np.zeros(0), *(t for t, _ in self._columns(clock, []))])
-        for raw in self._raw(index, wanted, records):
+        for raw in self._raw(index, wanted, records, floats):
             stamps = np.full(raw.records, np.nan)
             there = t[raw.first : raw.first + raw.records]
             stamps[: len(there)] = there
             yield stamps, self._values(index, wanted, raw)
 
-    def _raw(self, index: int, wanted: Sequence[int], records: int) -> Iterator[Raw]:
-        """Raw samples; those of virtual channels are the numbers of their records."""
+    def _raw(self, index: int, wanted: Sequence[int], records: int, floats: Collection[int] = ()) -> Iterator[Raw]:
+        """Raw samples, `floats` as float64; those of virtual channels are the numbers of their records."""
         group = self._groups[index]
         stored = [i for i in dict.fromkeys(wanted) if not group.channels[i].is_virtual]
-        for raw in raw_pieces(self._sorted if group.id_size else self._path, group, stored, records):
+        for raw in raw_pieces(self._sorted if group.id_size else self._path, group, stored, records, floats):
             numbers = np.arange(raw.first, raw.first + raw.records)
             yield raw._replace(samples=raw.samples | dict.fromkeys(set(wanted) - set(stored), numbers))
 
@@ -194,26 +190,29 @@ class GroupReader(OpenFile):
             raw = raw.astype(np.float64)
         conversion = clock.conversion
         if conversion is None or not (self._version4 or conversion.kind == "linear"):
-            return raw.astype(np.float64)
+            return raw.astype(np.float64, copy=False)
         exact = conversion.kind in ("ranges", "texts", "texts of ranges")
         return np.asarray(physical(conversion, raw) if exact else converted(conversion, raw), dtype=np.float64)
 
     def _values(self, index: int, wanted: Sequence[int], raw: Raw) -> dict[int, _Array]:
         found = {}
-        for i in wanted:
+        for i in dict.fromkeys(wanted):
             channel = self._groups[index].channels[i]
             if channel.is_invalid:
                 found[i] = np.full(raw.records, np.nan)
                 continue
-            found[i] = physical(channel.conversion, raw.samples[i])
+            found[i] = physical(channel.conversion, raw.samples[i], is_free=True)
             if i in raw.invalid:
                 found[i] = np.where(raw.invalid[i], np.nan, found[i])
         return found
 
     def _nanoseconds(self, t: _Array) -> tuple[TimeArray, BoolArray]:
         """Time stamps in ns, and which of them are times at all."""
-        usable = np.isfinite(t) & (np.abs(t) < _LATEST_S - self._start_ns * 1e-9)
-        return np.round((t if usable.all() else t[usable]) * 1e9).astype(np.int64) + self._start_ns, usable
+        usable = np.abs(t) < _LATEST_S - self._start_ns * 1e-9
+        exact = (t if usable.all() else t[usable]) * 1e9
+        t_ns = np.round(exact, out=exact).astype(np.int64)
+        t_ns += self._start_ns
+        return t_ns, usable
 
     def _count_records(self, index: int, n: int, n_bad: int) -> None:
         declared = self._groups[index].cycles

@@ -89,14 +89,7 @@ class _Signal:
 
 
 class MdfReader(GroupReader):
-    """One open MDF file.
-
-    Parameters
-    ----------
-    path : Path
-        The file; only ever read.
-    options : ReadOptions
-        `dbc` decodes raw CAN frames.
+    """One open MDF file, only ever read; `dbc` of the options decodes raw CAN frames.
 
     Raises
     ------

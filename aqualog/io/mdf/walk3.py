@@ -61,14 +61,7 @@ class _Declared(NamedTuple):
 
 
 def survey3(data: Any, path: Path) -> Survey:
-    """Walk through a file.
-
-    Parameters
-    ----------
-    data : buffer of bytes
-        The file's content.
-    path : Path
-        For errors.
+    """Walk through the content of a file; `path` is for errors.
 
     Raises
     ------

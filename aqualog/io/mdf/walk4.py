@@ -49,16 +49,9 @@ class _Records(NamedTuple):
 
 
 def survey4(data: Any, path: Path, damaged: Collection[int] = ()) -> Survey:
-    """Walk through a file.
+    """Walk through the content of a file; `path` is for errors.
 
-    Parameters
-    ----------
-    data : buffer of bytes
-        The file's content.
-    path : Path
-        For errors.
-    damaged : collection of int
-        Addresses of packed blocks that are known not to unpack: their records end before them.
+    `damaged`: addresses of packed blocks that are known not to unpack: their records end before them.
 
     Raises
     ------

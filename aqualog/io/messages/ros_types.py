@@ -217,23 +217,10 @@ class _NotFixedError(Exception):
 
 
 def ros_layout(types: Mapping[str, Any], msgtype: str, data: bytes, *, cdr: bool) -> Layout | None:
-    """Layout of messages like this one.
+    """Layout of messages like this one; None if its type has fields without a fixed place, or it is damaged.
 
-    Parameters
-    ----------
-    types : mapping
-        Constants and fields by type, as rosbags parses definitions.
-    msgtype : str
-        The message's type.
-    data : bytes
-        A message.
-    cdr : bool
-        ROS 2's encoding: aligned, in either byte order, texts end with a zero. ROS 1's has none of these.
-
-    Returns
-    -------
-    Layout or None
-        None if the type has fields without a fixed place, or the message is damaged.
+    `types`: constants and fields by type, as rosbags parses definitions. `cdr`: ROS 2's encoding, which is aligned, in
+    either byte order, and ends texts with a zero. ROS 1's has none of these.
     """
     walk = _Walk(types, data, cdr=cdr)
     try:

@@ -24,17 +24,9 @@ _BLOCK = 1 << 20  # bytes
 
 
 class RecordWalk(ABC, Generic[Head]):
-    """One pass over the records of a file.
+    """One pass over the records of a file of this size [byte], from `start` on, where the first one stands.
 
-    Parameters
-    ----------
-    file : BinaryIO
-    size : int
-        Of the file. [byte]
-    start : int
-        Where the first record stands.
-    chunks : sequence of int
-        Where the index knows chunks; empty without a sound one.
+    `chunks`: where the index knows chunks; empty without a sound one.
     """
 
     overlap = 0
@@ -112,10 +104,6 @@ class MessageSource(ABC):
 
     `truncated`: an unknown amount is lost; `unassigned`: lost messages of no known topic;
     `unfinalised`: the recorder has not written the index that ends a file.
-
-    Parameters
-    ----------
-    path : Path
     """
 
     missing = "channel records"

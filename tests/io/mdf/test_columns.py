@@ -191,11 +191,6 @@ def test_mdf_3_as_asammdf_reads_it(tmp_path):
     same(read(tmp_path / "a.mdf")[0], by_asammdf(tmp_path / "a.mdf"))
 
 
-def raw_columns(path, group, wanted):
-    (found,) = columns.raw_pieces(path, group, wanted, 1 << 62)
-    return found
-
-
 def test_pieces_are_the_whole(tmp_path, monkeypatch):
     monkeypatch.setattr(columns, "_PIECE", 500)
     rng = np.random.default_rng(9)
@@ -206,13 +201,21 @@ def test_pieces_are_the_whole(tmp_path, monkeypatch):
         tmp_path / "a.mf4", [group], Layout((4200, 4201, 6300, 12600), (None, None, None, "deflate"))
     )
     with MdfReader(path, ReadOptions()) as r:
-        pieces = list(columns.raw_pieces(path, r._groups[0], [1, 2], 100))
-        whole = raw_columns(path, r._groups[0], [1, 2])
+        pieces = list(columns.raw_pieces(path, r._groups[0], [1, 2], 100, {1}))
+        (whole,) = columns.raw_pieces(path, r._groups[0], [1, 2], 1 << 62)
     assert len(pieces) > 5
+    assert {p.samples[1].dtype for p in pieces} == {np.dtype(np.float64)}
     for i in (1, 2):
         np.testing.assert_array_equal(np.concatenate([p.samples[i] for p in pieces]), whole.samples[i])
     np.testing.assert_array_equal(np.concatenate([p.invalid[1] for p in pieces]), whole.invalid[1])
     assert list(whole.invalid) == [1]
+
+
+def test_a_channel_is_scaled_once_however_often_it_is_asked_for(tmp_path):
+    path = written(tmp_path / "a.mf4", [(50, [("<f8", CONVERSIONS[1])])], compression=0, rng=np.random.default_rng(1))
+    with MdfReader(path, ReadOptions()) as r:
+        once, twice = (r.read([*r.channels()] * k) for k in (1, 2))
+    assert [c.values.tolist() for c in twice] == [c.values.tolist() for c in once] * 2
 
 
 @pytest.mark.parametrize("library", ["libdeflate", "zlib"])
@@ -225,10 +228,10 @@ def test_a_block_that_inflates_to_another_size_than_it_tells_is_refused(tmp_path
     with MdfReader(path, ReadOptions()) as r:
         (group,) = r._groups
         (block,) = group.data
-        assert len(raw_columns(path, group, [1]).samples[1]) == 3000
+        assert len(next(columns.raw_pieces(path, group, [1], 1 << 62)).samples[1]) == 3000
         lying = replace(group, cycles=group.cycles + more // 16, data=(replace(block, unpacked=block.unpacked + more),))
         with pytest.raises(Exception):  # noqa: B017, PT011 - each library has an error of its own
-            raw_columns(path, lying, [1])
+            next(columns.raw_pieces(path, lying, [1], 1 << 62))
 
 
 def test_a_flipped_bit_is_found_by_either_library(tmp_path, monkeypatch):
@@ -242,7 +245,7 @@ def test_a_flipped_bit_is_found_by_either_library(tmp_path, monkeypatch):
         for library in (columns._libdeflate, None):
             monkeypatch.setattr(columns, "_libdeflate", library)
             with pytest.raises(Exception):  # noqa: B017, PT011 - each library has an error of its own
-                raw_columns(tmp_path / "b.mf4", r._groups[0], [1])
+                next(columns.raw_pieces(tmp_path / "b.mf4", r._groups[0], [1], 1 << 62))
 
 
 def mapped(path):

@@ -28,7 +28,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.io.decompress import FREE, Allowance, DamagedError
 from aqualog.io.messages import mcap
 from aqualog.io.messages.mcap import McapSource, scanned
-from aqualog.io.messages.reader import McapReader
+from aqualog.io.messages.reader import McapReader, RosReader
 from aqualog.io.reader import ReadOptions
 from aqualog.io.write_mcap import McapTopic, write_mcap
 from tests.mcap_log import writing
@@ -532,14 +532,15 @@ def test_chunks_without_checksums_are_proven_by_that_of_the_data(tmp_path):
     assert any("checksum" in note for note in reader.faults.notes)
 
 
-@pytest.mark.parametrize("content", [b"", b"not an mcap file at all"])
-def test_other_files_are_refused(tmp_path, content):
-    path = tmp_path / "x.mcap"
+@pytest.mark.parametrize("content", [b"", b"something else entirely"])
+@pytest.mark.parametrize(("reader", "name"), [(McapReader, "x.mcap"), (RosReader, "x.bag")])
+def test_other_files_are_refused(tmp_path, reader, name, content):
+    path = tmp_path / name
     path.write_bytes(content)
-    with pytest.raises(LogError, match=r"x\.mcap"):
-        McapReader(path, ReadOptions())
-    with pytest.raises(LogError):
-        McapReader(tmp_path / "none.mcap", ReadOptions())
+    with pytest.raises(LogError, match=name):
+        reader(path, ReadOptions())
+    with pytest.raises(LogError, match=r"cannot be opened|does not exist"):
+        reader(tmp_path / f"no_{name}", ReadOptions())
 
 
 @pytest.mark.parametrize("start", [None, T0])
