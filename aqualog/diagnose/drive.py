@@ -173,9 +173,9 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     if "yaw_rate" in filled:
         bad |= np.abs(v * filled["yaw_rate"]) > A_Y_MAX
     # friction brakes are at every wheel: the torque of one axle cannot hold them
-    every_wheel = torqued and all(f"torque_{w}" in filled for w in WHEELS)
-    if "brake_pressure" in filled and not (every_wheel and brakes_in_torque(filled["brake_pressure"], torque)):
-        bad |= filled["brake_pressure"] > BRAKE_PRESSURE
+    every_wheel, pressed = torqued and all(f"torque_{w}" in filled for w in WHEELS), filled.get("brake_pressure")
+    if pressed is not None and not (every_wheel and brakes_in_torque(pressed, torque, v, vehicle, dt)):
+        bad |= pressed > BRAKE_PRESSURE
         notes.append("braking is left out: its torque is not in the log")
     if not torqued:
         bad |= np.gradient(speed, dt) > A_MOST

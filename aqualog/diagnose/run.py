@@ -142,7 +142,7 @@ def diagnose(
         seen=p if p <= options.level else None, untested=untested | seen.untested,
     )  # fmt: skip
     if outcome.verdict == "no_effect" and p <= options.level:
-        notes += (f"The test found more than noise (p = {p:.2g}), but no effect large enough to be worth naming.",)
+        notes += (f"The test found more than noise (p = {p:.2g}). It may be small, or no effect that is known.",)
     return Diagnosis(
         verdict=outcome.verdict,
         sentence=sentence,

@@ -95,7 +95,7 @@ def verdict_sentence(
     """
     names = [name_of(c.effect, c.where) for c in causes]
     if verdict == "no_effect" and seen is not None:
-        return f"No effect: more than noise is left (p = {seen:.2g}), but no effect large enough to be worth naming."
+        return f"No effect is named: more than noise is left (p = {seen:.2g}), but no known effect explains it clearly."
     if verdict == "no_effect":
         agrees = f"No effect: the model agrees with the measurement, at a false-alarm level of {level:g}"
         why = Counter((untested or {}).values()).most_common(1)

@@ -124,7 +124,9 @@ def test_documents_that_are_files(tmp_path):
     assert complaints("detect", json.loads((tmp_path / "out" / "events.json").read_text())) == []
     assert complaints("history", json.loads((tmp_path / "slopes.json").read_text())) == []
     known = {c.name for t in TABLES if t.name == "signals.parquet" for c in t.columns}
-    assert known == {"t", "SIGNAL", "DETECTOR_PLACE", "DETECTOR_PLACE_bit"}
+    assert known == {"t", "SIGNAL", "DETECTOR_PLACE", "DETECTOR_PLACE_bit", "aquaplaning_margin"}
+    written = pl.read_parquet_schema(tmp_path / "out" / "signals.parquet")
+    assert {f"aquaplaning_margin{end}" for end in ("", "_low", "_high")} <= set(written)
     printed("slip-slope", MONDAY, *CAR, "--json", "-o", tmp_path / "slope")
     assert complaints("slip_slope", json.loads((tmp_path / "slope" / "slip_slope.json").read_text())) == []
     heading = (tmp_path / "slope" / "slip_slope.csv").read_text().splitlines()[0].split(",")

@@ -126,12 +126,15 @@ def test_the_time_since_braking_counts_from_its_end():
 
 
 def test_braking_is_left_out_where_the_torque_does_not_hold_it():
-    log = plain()
-    p = np.where(np.arange(log.frame.height) // 100 == 30, 10e5, 0.0)
-    d = prepare(changed(log, log.frame.with_columns(pl.Series("brake_pressure", p))), CAR, "a")
-    assert not d.mask[292:318].any()
+    log = signals(speed=((0.0, 24.0), (30.0, 24.0), (33.0, 18.0), (90.0, 18.0)))
+    p = np.where(np.arange(log.frame.height) // 300 == 10, 10e5, 0.0)
+    pressed = log.frame.with_columns(pl.Series("brake_pressure", p))
+    driven = pressed.with_columns(pl.col(f"torque_{w}").clip(-80.0, None) for w in WHEELS)  # the engine's drag
+    d = prepare(changed(log, driven), CAR, "a")
+    assert not d.mask[302:328].any()
     assert d.mask[:280].all()
     assert any("braking" in n for n in d.notes)
+    assert prepare(changed(log, pressed), CAR, "a").mask[305:325].all()
 
 
 def test_jumps_of_the_torque_are_left_out_and_no_more_than_that():

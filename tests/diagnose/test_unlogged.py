@@ -7,7 +7,7 @@ import pytest
 
 from aqualog.core.notation import WHEELS
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.inputs import brakes_unlogged, needed_torque, roll_out
+from aqualog.diagnose.inputs import brakes_in_torque, brakes_unlogged, needed_torque, roll_out
 from aqualog.model.follow import follow
 from aqualog.model.scenario import Steering
 from aqualog.model.term import Model
@@ -53,6 +53,16 @@ def test_climbing_at_speed_is_no_brake():
     climbing, braking = (np.resize(40.0 - a * np.arange(500) * DT, 2500) for a in (1.1, 2.0))
     assert not brakes_unlogged(still, climbing, off, car, DT)
     assert brakes_unlogged(still, braking, off, car, DT)
+
+
+@pytest.mark.parametrize(("drag", "brakes", "held"), [(330.0, 0.0, False), (330.0, 1.0, True), (0.0, 0.8, True)])
+def test_the_deceleration_says_whether_the_torque_holds_the_brakes(drag, brakes, held):
+    """An engine drags with 330 N·m, which is a third of a gentle braking; a gain may be a fifth off."""
+    v = np.r_[np.full(1000, 30.0), 30.0 - 1.8 * np.arange(1000) * DT]
+    pressed = np.r_[np.zeros(1000), np.full(1000, 4e5)]
+    whole = CAR.mass * (1.8 - roll_out(v, CAR)) * CAR.arm("fl")
+    torque = np.tile(-np.maximum(drag, brakes * whole) / 4.0, (4, 1))
+    assert brakes_in_torque(pressed, torque, v, CAR, DT) == held
 
 
 @pytest.mark.parametrize("v", [15.0, 35.0])

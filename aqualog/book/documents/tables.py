@@ -126,11 +126,13 @@ _SAMPLES = Table(
 )
 _SIGNALS = Table(
     "signals.parquet",
-    "`aqualog detect -o DIR`; `--write FILE` has the same as channels",
-    "Signals, statistics and detection bits of one drive on the common time grid.",
+    "`aqualog detect -o DIR`; `--write FILE` has the same and all features as channels",
+    "Signals, statistics, detection bits and the distance to full aquaplaning of one drive on the common time grid.",
     (
         number("t", "s", "time from the log's first sample"),
         number("SIGNAL", "SI", "every signal of the drive, see the page of signals"),
+        number("aquaplaning_margin", "m/s", "distance to full aquaplaning; with `_low`, `_high` its 90 % interval, "
+               "with `_q25`, `_q75` its 50 % interval"),
         number("DETECTOR_PLACE", "unit of the statistic", "statistic of a detector at a wheel or side"),
         number("DETECTOR_PLACE_bit", "-", "1 while the detector is active, else 0"),
     ),

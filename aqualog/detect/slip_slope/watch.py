@@ -329,5 +329,5 @@ def _remarks(slope: SlopeSummary) -> Iterator[str]:
     if slope.reference_from == "this drive" and slope.judged_s >= LEAST:
         yield (
             f"the dry slope of {slope.reference:.0f} is this drive's own: if it began on a slippery road, nothing "
-            "shows. Give tyre.slip_slope_f and slip_slope_r in the vehicle file, or a --history"
+            "shows. A --history of other drives of this car would show it"
         )

@@ -117,7 +117,10 @@ def signal_groups(signals: Signals) -> list[LogGroup]:
 
 
 def result_groups(result: DriveResult, *, features: bool = False) -> list[LogGroup]:
-    """Canonical signals, statistics and detection bits as channels of three groups; on request features of a fourth."""
+    """Canonical signals, features, statistics and detection bits as channels of groups.
+
+    Of the features the distance to full aquaplaning alone, on request all.
+    """
     statistics = {
         track_name(t): (
             _UNITS.get(t.unit, t.unit),
@@ -130,7 +133,7 @@ def result_groups(result: DriveResult, *, features: bool = False) -> list[LogGro
         f"{track_name(t)}_bit": ("bool", f"detection bit of {t.detector}", t.active.astype(np.float64))
         for t in result.tracks
     }
-    known = {n: feature_of(n) for n in result.features.columns} if features else {}
+    known = {n: feature_of(n) for n in result.features.columns if features or n.startswith("aquaplaning_margin")}
     looked_at = {
         n: (_UNITS.get(f.unit, f.unit), f.meaning, result.features[n].cast(pl.Float64).to_numpy())
         for n, f in known.items()
