@@ -131,8 +131,12 @@ _SIGNALS = Table(
     (
         number("t", "s", "time from the log's first sample"),
         number("SIGNAL", "SI", "every signal of the drive, see the page of signals"),
-        number("aquaplaning_margin", "m/s", "distance to full aquaplaning; with `_low`, `_high` its 90 % interval, "
-               "with `_q25`, `_q75` its 50 % interval"),
+        number(
+            "aquaplaning_margin",
+            "m/s",
+            "distance to full aquaplaning; with `_low`, `_high` its 90 % interval, "
+            "with `_q25`, `_q75` its 50 % interval",
+        ),
         number("DETECTOR_PLACE", "unit of the statistic", "statistic of a detector at a wheel or side"),
         number("DETECTOR_PLACE_bit", "-", "1 while the detector is active, else 0"),
     ),
