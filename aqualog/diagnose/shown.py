@@ -19,6 +19,9 @@ SEEN = 2.0  # standard deviations at which a third of the drive says something o
 # least share of what an effect of the wheels explains, in what their speeds show: right names had 0.31 and more, wrong
 # ones beside measured noise 0.04 and less (S)
 BY_WHEELS = 0.2
+# what effects show one by one, over what they show together, from which on they cancel: ten right pairs of another
+# simulator had 0.7 to 1.1, a torque gain with a trailer for a slip slope 12 (S)
+CANCELS = 3.0
 _ORDINAL = ("the first", "the second", "the last")
 
 
@@ -26,7 +29,8 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
     """What speaks against naming some members of a refitted set, by their keys; empty if nothing does.
 
     Each third of the drives that says something of a value must give it the same sign, and must be predicted better
-    with the values of the other two thirds than without the set. No value may stand at its physical bound.
+    with the values of the other two thirds than without the set. No value may stand at its physical bound, and effects
+    must not cancel each other.
     """
     off = refit.off
     G, b = (x.sum(axis=1) for x in _by_third(refit, arena, noises))
@@ -50,6 +54,11 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
     if total <= 0.0:
         every = ", ".join(name_of(h.effect.name, h.where) for h in refit.members)
         out.append(f"{every}: two thirds of the drive do not predict the other third better with it.")
+    whole = G.sum(axis=0)
+    own = np.array([[o is h for o, _ in refit.names] for h in refit.members])
+    alone_sum = float(np.einsum("hi,i,ij,j,hj->", own, off, whole, off, own))
+    if alone_sum > CANCELS * float(off @ whole @ off):
+        out.append("the effects cancel each other for the most part: together they stand for something else.")
     if any(at and h.key in names for (h, _), at in zip(refit.names, refit.bounded, strict=True)):
         out.append("a value stands at its physical bound.")
     return tuple(out)

@@ -44,6 +44,18 @@ def test_a_value_at_its_bound_is_no_name():
     assert speaking(a, 0.4, before, {"another"}, at_bound=True) == speaking(a, 0.4, before, {key}) == ()
 
 
+@pytest.mark.parametrize(("values", "speaks"), [((0.4, 0.3), False), ((4.0, -3.8), True)])
+def test_effects_that_cancel_are_no_names(values, speaks):
+    a, rng = arena(3), np.random.default_rng(6)
+    signature = a.evidence.signatures[0][:1]
+    alike = np.concatenate([signature, signature + 0.1 * signature.std() * rng.standard_normal(signature.shape)])
+    off, h = np.array(values), a.evidence.asked[:2]
+    left = a.evidence.residuals[0]
+    refit = Refit(tuple(h), off, off, np.eye(2), 0.0, Model(), (left,), (alike,), (False, False))
+    found = repeats(refit, a, [fit_noise(left, a.evidence.drives[0].mask, np.eye(1))], {x.key for x in h})
+    assert any("cancel" in why for why in found) == speaks
+
+
 @pytest.mark.parametrize(
     ("effect", "where", "shows", "out"),
     [
