@@ -17,6 +17,8 @@ from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
+from aqualog.diagnose.sets import Fitted
+from aqualog.diagnose.shapes import MECHANISMS
 from aqualog.diagnose.spectrum import weighing
 from aqualog.diagnose.unexplained import unknown_forms
 from aqualog.diagnose.unknown_term import as_term
@@ -229,3 +231,20 @@ def test_what_the_plant_has_no_table_for_becomes_no_term():
     assert as_term(remainder(x, 0.0 * x, mechanism="slip_f")) is None
     assert as_term(remainder(x, 0.0 * x, depends_on=("t",))) is None
     assert as_term(remainder(np.linspace(5, 40, 60), np.full(60, 1e6))) is None
+
+
+@pytest.mark.parametrize(("mechanism", "channel"), [("slip_f", "slip_fl"), ("force", "kinematic")])
+def test_what_the_wheels_do_shows_in_their_slip(mechanism, channel):
+    """A form of the wheels that explains the accelerometer alone is an error of the simulator."""
+    rng = np.random.default_rng(8)
+    f = rng.standard_normal((1, 2, 500)) * [[[0.3], [0.001]]]
+    part = SimpleNamespace(
+        residual=f[0] + 0.01 * rng.standard_normal((2, 500)), mask=np.ones(500, dtype=bool),
+        channels=("kinematic", "slip_fl"),
+    )  # fmt: skip
+    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == mechanism))
+    block = Block("a", "shape", (0,), np.eye(1), 0.0, 0)
+    field = SimpleNamespace(parts=(part,), blocks=(block,), shapes=(shape,), drawn=lambda *_: f)
+    is_large, share, where = unexplained._where(field, [0], Fitted([0], np.ones(1), np.eye(1)))
+    assert where == channel
+    assert (is_large, share > 0.9) == ((True, True) if channel == "kinematic" else (False, False))
