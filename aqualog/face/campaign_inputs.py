@@ -141,7 +141,11 @@ def is_campaign(inputs: Sequence[str]) -> bool:
     """Return whether a campaign file is named; one among other inputs is a ConfigError."""
     named = [i for i in inputs if i.lower().endswith(".toml")]
     if named and len(inputs) > 1:
-        raise ConfigError("stands among other inputs", where=named[0], expected="one campaign file, or logs only")
+        raise ConfigError(
+            "stands among other inputs",
+            where=named[0],
+            expected="one campaign file, or logs only; a vehicle file comes behind --vehicle",
+        )
     return bool(named)
 
 
