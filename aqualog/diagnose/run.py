@@ -141,8 +141,6 @@ def diagnose(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
         seen=p if p <= options.level else None, untested=untested | seen.untested,
     )  # fmt: skip
-    if outcome.verdict == "no_effect" and p <= options.level:
-        notes += (f"The test found more than noise (p = {p:.2g}). It may be small, or no effect that is known.",)
     return Diagnosis(
         verdict=outcome.verdict,
         sentence=sentence,

@@ -55,9 +55,8 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
         every = ", ".join(name_of(h.effect.name, h.where) for h in refit.members)
         out.append(f"{every}: two thirds of the drive do not predict the other third better with it.")
     whole = G.sum(axis=0)
-    own = np.array([[o is h for o, _ in refit.names] for h in refit.members])
-    alone_sum = float(np.einsum("hi,i,ij,j,hj->", own, off, whole, off, own))
-    if alone_sum > CANCELS * float(off @ whole @ off):
+    each = np.array([np.where([owner is h for owner, _ in refit.names], off, 0.0) for h in refit.members])
+    if float(np.einsum("hi,ij,hj->", each, whole, each)) > CANCELS * float(off @ whole @ off):
         out.append("the effects cancel each other for the most part: together they stand for something else.")
     if any(at and h.key in names for (h, _), at in zip(refit.names, refit.bounded, strict=True)):
         out.append("a value stands at its physical bound.")
