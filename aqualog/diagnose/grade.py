@@ -42,7 +42,7 @@ SMOOTHED = 0.03  # share of the rms that smoothing may remove or noise may add
 LAGS = 50.0  # of a drive that differ, each of which may look like a lap by chance
 LAP_LEAST_M, LAP_SIGMAS, LAP_CORRELATION = 500.0, 4.5, 0.7
 ALIKE_M = 2000.0  # [m] over which the road's autocorrelation counts
-GOES_WITH_ACCELERATION = slice(3, None)  # of the shapes of `_motion`
+SPEED, GOES_WITH_ACCELERATION = 1, slice(3, None)  # of the shapes of `_motion`
 CLIPPED = 5.0  # robust standard deviations
 BIAS_SD, FORCE_SD = 0.1, 0.03  # [m/s^2] mean slope hidden by offsets of accelerometer and resistance (V, ESC; K)
 
@@ -135,7 +135,7 @@ def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
         # the accelerometer's drift is in both and cancels; wind and brakes are in the force balance alone
         power = float(np.mean(F[at] ** 2))
         share = min(max(float(np.mean((K * F)[at])) / max(power, 1e-12), 0.0), 1.0)
-        z, p = bins.kinematic - share * bins.force, math.erfc(score / math.sqrt(2.0))
+        z, p = bins.kinematic - share * bins.drift(bins.force), math.erfc(score / math.sqrt(2.0))
     s, theta, half = _estimate(bins, z)
     return Profile(s, theta, _rms(theta, half, bins), _mean(bins), p, shared, lap)
 
@@ -187,6 +187,13 @@ class _Bins:
         root = np.sqrt(self.weight)
         beta = np.linalg.lstsq(self.motion * root[:, None], x * root, rcond=1e-10)[0]
         return np.asarray(np.where(self.used, x - self.motion @ beta, 0.0))
+
+    def drift(self, x: FloatArray) -> FloatArray:
+        """A force balance without the part that follows the speed: wind and drag are no road."""
+        v, root = self.motion[:, SPEED : SPEED + 1], np.sqrt(self.weight)[:, None]
+        shapes = np.concatenate([self.motion, v * v], axis=1)
+        beta = np.linalg.lstsq(shapes * root, x * root[:, 0], rcond=1e-10)[0]
+        return np.asarray(x - np.concatenate([v, v * v], axis=1) @ beta[[SPEED, -1]])
 
     def smooth(self, x: FloatArray) -> FloatArray:
         """Mean with a raised cosine of 150 m half width, over the used bins."""

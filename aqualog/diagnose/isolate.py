@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import combinations
 from statistics import NormalDist
 
 import numpy as np
 
 from aqualog.core.records import FloatArray
+from aqualog.diagnose.competition import SCALES, Block
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.records import Confusion, Limit
 from aqualog.diagnose.subsets import compatible
 from aqualog.diagnose.words import listed, name_of, quantity
 
-__all__ = ["POWER", "confusions", "limits", "p_correct", "reference_sizes"]
+__all__ = ["POWER", "confusions", "likelier_than_none", "limits", "p_correct", "reference_sizes"]
 
 POWER = 0.9
 TOLD_APART = 0.95  # probability of naming the right one of two, from which they count as distinguished
@@ -27,10 +29,30 @@ def p_correct(lam: float) -> float:
     return NormalDist().cdf(0.5 * math.sqrt(max(lam, 0.0)))
 
 
-def reference_sizes(evidence: Evidence, gram: FloatArray, threshold: float) -> FloatArray:
+def likelier_than_none(evidence: Evidence, blocks: Sequence[Block], shared: FloatArray) -> FloatArray:
+    """Size of each column (K,) from which its effect is more likely than none, against its prior and its freedom.
+
+    `shared` (K + 1, K + 1): inner products with the tolerances, of noise that counts by its share. What a file may be
+    wrong by counts in full there: the limit of a value is a few of its standard deviations, not a few of the noise's.
+    """
+    out = np.zeros(evidence.count)
+    for b in blocks:
+        for c in evidence.columns[b.tag] if b.kind == "effect" else ():
+            variance = 1.0 / max(shared[c, c], 1e-30)
+            # the competition gains the mean over two scales of the prior
+            priors = [(s * float(evidence.prior[c])) ** 2 for s in SCALES]
+            nats = [-b.log_prior + 0.5 * math.log1p(p / variance) + math.log(len(SCALES)) for p in priors]
+            squares = [2.0 * n * variance * (1.0 + variance / p) for n, p in zip(nats, priors, strict=True)]
+            out[c] = math.sqrt(min(squares))
+    return out
+
+
+def reference_sizes(
+    evidence: Evidence, gram: FloatArray, threshold: float, least: FloatArray | None = None
+) -> FloatArray:  # fmt: skip
     """Size of each column (K,) that is detected with a power of 0.9, or the smallest worth naming if that is larger.
 
-    NaN where no physical size would be detected.
+    NaN where no physical size would be detected. `least` (K,): sizes that it must reach besides, in the same way.
     """
     out = np.full(evidence.count, np.nan)
     for columns in evidence.columns:
@@ -39,7 +61,9 @@ def reference_sizes(evidence: Evidence, gram: FloatArray, threshold: float) -> F
             if energy <= 1e-12:
                 continue
             # the test's statistic is the gain per value of the effect
-            seen = (math.sqrt(threshold * len(columns)) + NormalDist().inv_cdf(POWER)) / math.sqrt(energy)
+            tested = math.sqrt(threshold * len(columns) / energy)
+            asked = tested if least is None else max(tested, float(least[c]))
+            seen = asked + NormalDist().inv_cdf(POWER) / math.sqrt(energy)
             if seen <= max(evidence.high[c], -evidence.low[c]):
                 out[c] = max(seen, evidence.smallest[c])
     return out

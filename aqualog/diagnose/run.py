@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -16,12 +15,11 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, widened
 from aqualog.diagnose.any_effect import SURROGATES
-from aqualog.diagnose.arena import KNOWN_PRIOR
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.drive import Drive, led_by, prepare
-from aqualog.diagnose.evidence import Evidence, recentred
+from aqualog.diagnose.evidence import Evidence, recentred, tolerant
 from aqualog.diagnose.faster import faster, joined, with_rings
 from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
@@ -54,9 +52,6 @@ _WET = "Laws of water differ by that much; `aqualog calibrate --wet` fits one to
 # kept 0.13 to 1.8 of it, two wrong ones beside measured noise -0.3 and 0.0 (S)
 KEPT = 0.1
 SAME = 0.2  # of what a signal changes by from sample to sample, a difference that is rounding
-# of twice the log-likelihood that an effect must gain to be more likely than none: its prior, and what its freedom
-# costs in the competition (2.5 nats (natural logarithm), typical of 300 s)
-HEARD = 2.0 * (2.5 - math.log(KNOWN_PRIOR)) / COARSE
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,8 +116,9 @@ def diagnose(
     names = {d.name for d in ready}
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
     outcome, forms = joined(outcome, seen), (*found.forms, *seen.forms)
-    threshold = max(found.calibration.threshold, HEARD)
-    sizes = isolate.reference_sizes(evidence, found.gram, threshold)
+    shared = tolerant(evidence, COARSE * found.plain)
+    least = isolate.likelier_than_none(evidence, found.arena.blocks, shared)
+    sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.threshold, least)
     before = [residual(d, model) for d in ready] if road is None else [_led(d, bare) for d in ready]
     differs, is_unclear = extended.terms != bare.terms, outcome.verdict == "cannot_tell"
     alone, settled, after = _at_likeliest(found, evidence, bare, extended) if differs else (bare, extended, before)

@@ -68,13 +68,15 @@ class Option:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """`gram` (K + 1, K + 1) with tolerances and `calibration` describe what the log can distinguish.
+    """Inner products (K + 1, K + 1), `plain` and in `gram` with tolerances, and `calibration` describe what the log can
+    distinguish.
 
     `forms`: unknown forms; if there are any, `arena` and `posterior` are those of all that competes and there are no
     `options`. Else they are those of known effects, and `options` the sets with what they gain.
     """
 
     significance: Significance
+    plain: FloatArray
     gram: FloatArray
     calibration: Calibration
     arena: Arena
@@ -132,16 +134,16 @@ def search(
     test = significance(evidence, gram, calibration, level)
     forms = unknown_forms(arena, posterior, seed=seed)
     if forms:
-        return Found(test, gram, calibration, arena, posterior, forms)
+        return Found(test, plain, gram, calibration, arena, posterior, forms)
     so_far = f"so far {_likeliest(arena, posterior)}" if test.p_value <= level else "nothing beyond noise"
     tell(f"{so_far}; comparing known effects", 0.55)
     if test.p_value > level:
-        return Found(test, gram, calibration, arena, posterior)
+        return Found(test, plain, gram, calibration, arena, posterior)
     arena, posterior = _repeated(first, compete(first, begun=begun), model)
     tell(f"so far {_likeliest(arena, posterior)}; refitting in the simulator", 0.7)
     options = _refitted(evidence, arena, posterior, model)
     options = sorted(options, key=lambda o: -o.evidence)
-    return Found(test, gram, calibration, arena, posterior, (), tuple(options))
+    return Found(test, plain, gram, calibration, arena, posterior, (), tuple(options))
 
 
 def _likeliest(arena: Arena, posterior: Posterior) -> str:

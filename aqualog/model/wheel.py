@@ -63,6 +63,7 @@ _carcass_torque = inlined(rolling.carcass_torque)
 _hop = inlined(load.hop)
 _HOP_MASS, _HOP_STIFFNESS, _HOP_DAMPING = load.HOP
 _SPIN_UP_RATIO = float(hydroplaning.SPIN_UP_RATIO)
+STICKS = 5.0  # times its time constant, a step within which a sliding wheel comes to stick
 _FIELD_SHARE = float(np.sqrt(0.5))  # half of the contact's variance is the road's, half the wheel's own
 
 
@@ -380,11 +381,15 @@ def _twist(i, m, F_x, roll, ground, balance, q):  # type: ignore[no-untyped-def]
 @part
 def _jacobian(i, m, F_x, roll, slips, stiff, L, balance, p, q):  # type: ignore[no-untyped-def]
     # the secant, not the tangent: a sliding tyre must be damped too where one step would carry it past sticking
-    dF_dsx = abs(F_x) / abs(slips.s_x) if abs(slips.s_x) > 1e-9 else stiff.C_x * _stiffness_ratio(L)
+    sticking = stiff.C_x * _stiffness_ratio(L)
+    dF_dsx = abs(F_x) / abs(slips.s_x) if abs(slips.s_x) > 1e-9 else sticking
     jac = m.jac
     # where rim and belt are two, the tread is the belt's; their own coupling is not stiff
     tread, turned = (i + 4, q.belt_inertia) if q.belt_inertia > 0.0 else (i, q.inertia)
     arm = roll.r_e / turned
+    # one step makes it stick, and there it is stiffer: else the wheel swings to and fro from step to step
+    if p.dt * dF_dsx * slips.by_omega * arm > STICKS:
+        dF_dsx = max(dF_dsx, sticking)
     jac[OMEGA + tread] = -dF_dsx * slips.by_omega * arm
     jac[J_W + tread] = -dF_dsx * slips.by_v * arm
     jac[J_V + tread] = dF_dsx * slips.by_omega / p.mass

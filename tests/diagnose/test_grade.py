@@ -59,6 +59,14 @@ def test_with_it_in_the_model_the_residual_falls(hilly):
     assert find_profile(drive, after) is None
 
 
+def test_wind_and_drag_are_no_part_of_it(hilly):
+    drive, r, found = hilly
+    v, with_wind = drive.coordinates["v_x"], r.copy()
+    # a tail wind of 8 m/s and less drag: the torque moves the car more, and the accelerometer feels it
+    with_wind[drive.channels.index("force_balance")] += 0.005 * v + 3e-5 * v**2
+    np.testing.assert_allclose(find_profile(drive, with_wind).theta, found.theta, atol=5e-4)
+
+
 def test_two_profiles_are_one_term(hilly):
     _, _, found = hilly
     model = with_profile(with_profile(Model(), found), replace(found, theta=-found.theta))

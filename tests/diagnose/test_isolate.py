@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from aqualog.diagnose.isolate import confusions, limits, p_correct, reference_sizes
+from aqualog.diagnose.competition import COARSE, Block, packed, scores
+from aqualog.diagnose.evidence import forgiving
+from aqualog.diagnose.isolate import confusions, likelier_than_none, limits, p_correct, reference_sizes
 from tests.diagnose.test_subsets import ASKED, AT, bench_of, plain, waves
 
 THRESHOLD = 20.0
@@ -83,6 +85,21 @@ def test_the_limit_has_the_power_it_says():
     size = reference_sizes(b, G, THRESHOLD)[i]
     found = np.random.default_rng(1).standard_normal(20000) + size * np.sqrt(G[i, i])
     assert (found**2 > THRESHOLD).mean() == pytest.approx(0.9, abs=0.01)
+
+
+@pytest.mark.parametrize("of_file", [0.0, 0.05, 0.3])
+def test_at_the_limit_an_effect_is_as_likely_as_none(of_file):
+    b = scaled(by=0.2)
+    i = AT["head_wind"]
+    c, sigma = b.columns[i][0], b.prior[b.columns[i][0]]
+    allowed = np.zeros((b.count, b.count))
+    allowed[c, c] = (of_file * sigma) ** 2
+    block = Block("head_wind", "effect", (c,), np.eye(1) * sigma**2, np.log(0.03), i)
+    size = likelier_than_none(b, [block], forgiving(COARSE * plain(b), allowed).gram)[c]
+    inner = COARSE * plain(b)
+    inner[:, -1] = inner[-1] = size * np.append(inner[:-1, c], 0.0)
+    gain = scores(forgiving(inner, allowed).gram, packed([block])[0]).gain[0]
+    assert gain + block.log_prior == pytest.approx(0.0, abs=0.5)
 
 
 def test_what_is_never_seen_has_no_limit():

@@ -47,7 +47,7 @@ def option(evidence=SURE, sharp=0.0, signatures=S, model=Model(), **values):  # 
 
 def told(*options, model=Model()):  # noqa: B008 - frozen
     return conclude(
-        Found(SimpleNamespace(), np.zeros((1, 1)), SimpleNamespace(), ARENA, POSTERIOR, (), (*options, Option((), 0.0))),
+        Found(SimpleNamespace(), np.zeros((1, 1)), np.zeros((1, 1)), SimpleNamespace(), ARENA, POSTERIOR, (), (*options, Option((), 0.0))),
         model,
     )  # fmt: skip
 

@@ -195,7 +195,7 @@ def test_a_sharper_refit_that_fits_worse_is_left(monkeypatch):
     own = refit(b, [arena.blocks[i].tag], np.zeros(1), measure, Model())
     worse = replace(own, values=own.values + 0.5, off=own.off + 0.5, residuals=tuple(3.0 * r for r in own.residuals))
     monkeypatch.setattr(search, "refit", lambda *_: worse)
-    found = Found(None, None, None, arena, posterior)
+    found = Found(None, None, None, None, arena, posterior)
     assert sharpened(found, Option((i,), 0.0, own), Model())[0] is own
 
 

@@ -88,6 +88,17 @@ def test_a_car_stands_on_a_slope_where_the_measured_one_stands():
     assert np.abs(shown["v_x"][1500:2000]).max() < 0.2
 
 
+def test_a_wheel_that_drags_does_not_swing_after_a_start_from_rest():
+    t = np.arange(1200) * 0.01
+    v = np.interp(t, (0.0, 3.0, 12.0), (0.0, 0.0, 9.0))
+    of_axle = 0.5 * CAR.mass * np.gradient(v, 0.01) * CAR.arm("rl")
+    along = Course(t, np.array([0.0 * t, 0.0 * t, of_axle, of_axle]), 0.0 * t, v)
+    drags = Model((term("brake_drag", "fr", torque=5.0),))
+    long, short = (follow(CAR, along, drags, step=s) for s in (0.01, 0.001))
+    for w in WHEELS:
+        np.testing.assert_allclose(long[f"omega_{w}"][500:], short[f"omega_{w}"][500:], atol=0.02, err_msg=w)
+
+
 @pytest.mark.parametrize("delay", [0.2, -0.1])
 def test_a_torque_that_is_reported_late_is_applied_earlier(made, delay):
     t, c = made
