@@ -141,6 +141,8 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         asked = [w for w in places if _has_signal(w, present, torque=torque)]
         if not asked:
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
+        if "steer_angle" in present & set(effect.places):
+            untested[f"{effect.name}@steer_angle"] = "no residual compares the steering with the car's turning"
         for where in () if is_sought else asked:
             room = _room(effect, where, drives[0].vehicle, wheels=wheels)
             out += [Hypothesis(effect, where, free, fixed, room) for fixed in effect.drive.variants(length)]
@@ -167,7 +169,7 @@ def _room(effect: Effect, where: str | None, car: Vehicle, *, wheels: bool) -> f
 
 
 def _has_signal(where: str | None, present: frozenset[str], *, torque: bool) -> bool:
-    if where == "a_y":
+    if where in ("a_y", "yaw_rate"):
         return {"a_y", "yaw_rate", "steer_angle"} <= present
     if where in ("v_x", "a_x"):
         return where in present

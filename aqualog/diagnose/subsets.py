@@ -29,19 +29,22 @@ __all__ = ["TWINS", "compatible", "imitations", "supported"]
 
 TWINS = 0.1  # share of its energy that an effect must keep beside its twin, to stand in one set with it
 SHOWN = 4.0  # of twice the log-likelihood off the water: two standard deviations
+TURNING = {"a_y", "yaw_rate"}
 LEAST = 300  # samples off the water that the check needs at the least
 
 
 def compatible(evidence: Evidence, members: Sequence[int]) -> bool:
     """Whether a set holds each effect once per wheel, in one variant, and does not delay every signal.
 
-    Delays are relative: a delay of all signals only shifts the start of the log's clock, and one of all but one signal
-    is that signal's own, with the other sign.
+    Delays are relative: a delay of all signals that are compared with each other only shifts the start of their clock,
+    and one of all but one signal is that signal's own, with the other sign. Those of turning are apart from the others.
     """
     for effect in {evidence.asked[m].effect.name for m in members if evidence.asked[m].effect.drive.is_relative}:
         late = {evidence.asked[m].where for m in members if evidence.asked[m].effect.name == effect}
-        if len(late) > 1 and len(late) >= len({h.where for h in evidence.asked if h.effect.name == effect}) - 1:
-            return False
+        every = {h.where for h in evidence.asked if h.effect.name == effect}
+        for compared in (every & TURNING, every - TURNING):
+            if len(late & compared) > 1 and len(late & compared) >= len(compared) - 1:
+                return False
     seen: set[tuple[str, str]] = set()
     for m in members:
         h = evidence.asked[m]

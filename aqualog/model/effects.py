@@ -315,7 +315,8 @@ _ALL = [
         "signal_delay", "delay of a signal [s]", "The signal comes {delay:.3f} s late.", "GNSS up to 0.5 s (V)",
         (Parameter("delay", "s", 0.0, 0.1, -1.0, 2.0, 0.01, "late positive"),),
         _on_channels(lambda c, v: replace(c, delay_s=c.delay_s + v["delay"])), _SIGNALS, "v_x", twins=("clock_skew",),
-        drive=DriveSearch(places=("v_x", "a_x", "omega", "torque"), tolerance=0.01, is_shift=True, is_relative=True),
+        drive=DriveSearch(
+            places=("v_x", "a_x", "omega", "torque", "a_y", "yaw_rate"), tolerance=0.01, is_shift=True, is_relative=True),
     ),
     Effect(
         "tone_ring", "wheel-speed pick-up [-]", "The tone ring of the wheel is uneven by {amplitude:.2%}.",

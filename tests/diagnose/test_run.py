@@ -14,6 +14,7 @@ from aqualog.diagnose import arena, run, search
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
+from aqualog.model.scenario import Steering
 from aqualog.model.term import Model
 from tests.diagnose.test_drive import CAR, NOISY, changed, plain, signals, term
 
@@ -299,6 +300,14 @@ def test_a_late_velocity_is_named_without_one_of_the_wheels(monkeypatch):
     assert keys(d) == {"signal_delay@v_x"}
     assert d.causes[0].parameters["delay"].value == pytest.approx(0.1, abs=0.01)
     assert any("not all four wheel speeds" in n for n in d.notes)
+
+
+def test_a_late_yaw_rate_shows_in_the_lateral_motion(monkeypatch):
+    ask(monkeypatch, tuple(f"signal_delay@{w}" for w in ("v_x", "a_x", "a_y", "yaw_rate")))
+    d = told(log=noisy(term("signal_delay", "yaw_rate", delay=0.08), steering=Steering(0.01, 6.0)))
+    assert keys(d) == {"signal_delay@yaw_rate"}
+    assert d.causes[0].parameters["delay"].value == pytest.approx(0.08, abs=0.01)
+    assert "steering" in d.untested["signal_delay@steer_angle"]
 
 
 @pytest.mark.nightly

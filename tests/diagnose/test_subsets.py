@@ -178,8 +178,10 @@ def test_a_car_carries_one_load():
 
 
 def test_a_delay_of_all_signals_but_one_is_that_ones():
-    asked = tuple(hypothesis("signal_delay", w) for w in ("v_x", "a_x", "omega", "torque"))
+    asked = tuple(hypothesis("signal_delay", w) for w in ("v_x", "a_x", "omega", "torque", "a_y", "yaw_rate"))
     evidence = made(asked=asked)
     assert compatible(evidence, (0, 1))
     assert not compatible(evidence, (0, 1, 2))
     assert not compatible(evidence, (0, 1, 2, 3))
+    assert compatible(evidence, (0, 1, 4))
+    assert not compatible(evidence, (4, 5))
