@@ -52,6 +52,7 @@ A_X_MAX = 6.0  # [m/s^2]
 JERK_MAX, JERK_S = 10.0, 0.1
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
 BRAKES, LONG_AGO_S = -0.8, 60.0  # [m/s^2], [s] braking, and when it has been long ago
+WHILE_S = -15.0  # [s] in place of it while braking: far enough to act as it does after it, or not at all
 ROLLS_OUT = 0.15  # [m/s^2] a slope of 1.5 %, so that a road does not count as a brake
 # slip of a wheel beyond its grip: a wet tyre's force has its largest value at 0.08 to 0.2 (D: 3 mu / C), and driving
 # without floating needs a fifth of that
@@ -356,8 +357,8 @@ def _coordinates(
     slowing = out["a_x"] < BRAKES
     if slowing.any():
         last = np.maximum.accumulate(np.where(slowing, course.t, course.t[0] - LONG_AGO_S))
-        # while braking it counts as long ago: what lingers begins with a jump where the brakes are let off
-        out["since_braking"] = np.where(slowing, LONG_AGO_S, np.minimum(course.t - last, LONG_AGO_S))
+        # what lingers may act while braking, too, or begin with a jump where the brakes are let off
+        out["since_braking"] = np.where(slowing, WHILE_S, np.minimum(course.t - last, LONG_AGO_S))
     if "steer_angle" in columns:
         out["steer_angle"] = course.steer
     if "ambient_temperature" in columns:
