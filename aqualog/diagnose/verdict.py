@@ -15,6 +15,7 @@ __all__ = ["CREDIBLE", "PLACES", "Candidate", "Causes", "Outcome", "candidates",
 
 CREDIBLE = 20.0  # evidence ratio within which places of one effect cannot be distinguished
 PLACES = 5.0  # evidence ratio within which the whole car is preferred to a part of it
+WORTH_SAYING = 0.05  # probability of a set that is not named, from which a note tells of it
 LEAST_SHARE = 1e-4  # probability of a set, below which its values are not looked at
 
 Option = TypeVar("Option")
@@ -97,7 +98,7 @@ def decided(
         marginal.update({n: marginal.get(n, 0.0) + s.share for n in s.names})
     ranked = sorted(groups.values(), key=lambda g: -sum(s.share for s in g))
     if not ranked or not ranked[0][0].names:
-        return Outcome("no_effect", notes=_small(ranked[0][0]) if ranked else ())
+        return Outcome("no_effect", notes=(*_small(ranked[0][0]), *_likeliest(ranked[1:2])) if ranked else ())
     best, group = pick(ranked[0]), tuple(ranked[0])
     own = _with_probability(best.large, marginal)
     # the same effects at other places that explain the log as well, or nearly so
@@ -131,6 +132,12 @@ def decided(
 
 def _with_probability(causes: Sequence[Cause], marginal: Mapping[str, float]) -> tuple[Cause, ...]:
     return tuple(replace(c, probability=tempered(marginal.get(c.effect, 0.0))) for c in causes)
+
+
+def _likeliest(groups: Sequence[Sequence[Candidate[Option]]]) -> list[str]:
+    """What is said of the likeliest effects where no effect at all is likelier still."""
+    each = [(sum(s.share for s in g), " ".join(c.sentence for c in g[0].large)) for g in groups]
+    return [f"Not named, with a probability of {p:.2f}: {said}" for p, said in each if p >= WORTH_SAYING]
 
 
 def _small(s: Candidate[Option]) -> tuple[str, ...]:

@@ -55,3 +55,10 @@ def test_what_is_too_small_is_no_effect():
     assert (found.verdict, found.causes) == ("no_effect", ())
     assert found.notes == ("Significant, but too small to be worth naming: drag None.",)
     assert verdict([]).verdict == "no_effect"
+
+
+def test_the_likeliest_that_is_not_named_is_said_where_no_effect_is_likelier():
+    found = verdict([([], 0.0), ([cause("drag")], -2.0), ([cause("slope")], -8.0)])
+    assert (found.verdict, found.causes) == ("no_effect", ())
+    assert found.notes == ("Not named, with a probability of 0.12: drag None.",)
+    assert verdict([([], 0.0), ([cause("drag")], -4.0)]).notes == ()
