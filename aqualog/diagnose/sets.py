@@ -19,7 +19,7 @@ __all__ = [
 WIDTH = 8
 MOST = 4  # blocks in one set
 SWAPPED = 3  # sets in which every member is exchanged
-FEW_KNOWN, FEW = 3, 2  # first candidates of known effects and of other blocks
+FEW_KNOWN, FEW = 3, 4  # first candidates of known effects and of shapes
 DIES = 6.0  # [nats] behind the best set, at which a level of larger sets ends the search
 SINGULAR = 1e-3  # share of a column's energy that the others of its set must leave
 SMALLEST = 1e-12
@@ -94,14 +94,19 @@ def shares(evidence: Sequence[float]) -> FloatArray:
 def first_of(
     blocks: Sequence[Block], inner: FloatArray, name: Callable[[int], str], beside: Members = ()
 ) -> list[int]:  # fmt: skip
-    """The few known effects, each at its best place, and the few other blocks that gain most beside a set."""
+    """The few known effects, each at its best place, the few shapes, no more than two of a mechanism, and the road that
+    gain most beside a set."""
     gains = _gains(joined(inner, blocks, beside), blocks, packed(blocks), inner)
     order = [i for i in np.argsort(-gains, kind="stable").tolist() if i not in beside and gains[i] > 0.0]
-    known: dict[str, int] = {}
+    by_name: dict[tuple[str, str], list[int]] = {}
     for i in order:
-        if blocks[i].kind == "effect":
-            known.setdefault(name(i), i)
-    return [*list(known.values())[:FEW_KNOWN], *[i for i in order if blocks[i].kind != "effect"][:FEW]]
+        by_name.setdefault((blocks[i].kind, name(i)), []).append(i)
+
+    def first(kind: str, each: int, most: int) -> list[int]:
+        chosen = {i for (k, _), own in by_name.items() if k == kind for i in own[:each]}
+        return [i for i in order if i in chosen][:most]
+
+    return [*first("effect", 1, FEW_KNOWN), *first("shape", 2, FEW), *first("road", 1, 1)]
 
 
 def searched(

@@ -35,6 +35,11 @@ class Mechanism:
     is_road: bool = False  # every road has it: no unknown form
     scales: str = ""
 
+    @property
+    def may_drift(self) -> bool:
+        """Whether a smooth function of time or place is more than slow noise."""
+        return self.is_road or self.name in ("torque", "accelerometer_gain", "slip_f", "slip_r")
+
 
 ALONG = ("t", "position")
 _CAR = (("v_x",), ("torque",), ("a_y",), ("yaw_rate",), ("steer_angle",), ("since_braking",), ("water_depth",),
@@ -106,8 +111,9 @@ def shapes(coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, ha
         if m.source not in has:
             continue
         for names in m.over:
-            # over time and place a smooth function is no other than slow noise: see `elements`
-            if not all(n in coordinates for n in names) or (not m.is_road and set(names) & set(ALONG)):
+            # over time and place a smooth function is no other than slow noise, unless it multiplies what is fast:
+            # see `elements`
+            if not all(n in coordinates for n in names) or (not m.may_drift and set(names) & set(ALONG)):
                 continue
             if names not in made:
                 made[names] = basis(names, [coordinates[n] for n in names], mask, dt)

@@ -316,7 +316,8 @@ _ALL = [
         (Parameter("delay", "s", 0.0, 0.1, -1.0, 2.0, 0.01, "late positive"),),
         _on_channels(lambda c, v: replace(c, delay_s=c.delay_s + v["delay"])), _SIGNALS, "v_x", twins=("clock_skew",),
         drive=DriveSearch(
-            places=("v_x", "a_x", "omega", "torque", "a_y", "yaw_rate"), tolerance=0.01, is_shift=True, is_relative=True),
+            places=("v_x", "a_x", "omega", "torque", "a_y", "yaw_rate"), tolerance=0.01, is_shift=True,
+            is_relative=True),
     ),
     Effect(
         "tone_ring", "wheel-speed pick-up [-]", "The tone ring of the wheel is uneven by {amplitude:.2%}.",

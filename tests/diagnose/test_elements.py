@@ -7,6 +7,7 @@ import pytest
 
 from aqualog.diagnose.compete import compete
 from aqualog.diagnose.elements import with_elements
+from aqualog.diagnose.shapes import MECHANISMS, shapes
 from aqualog.diagnose.unexplained import unknown_forms
 from aqualog.diagnose.unknown_term import short_form
 from tests.diagnose.test_unexplained import arena, slow
@@ -20,6 +21,13 @@ def found(seed, force=None, **effects):
     a = with_elements(arena(seed, force, **effects))
     p = compete(a)
     return a, p, unknown_forms(a, p, seed=1)
+
+
+def test_only_what_multiplies_a_fast_signal_may_drift_smoothly():
+    t = np.arange(3000) * 0.1
+    made = shapes({"t": t, "torque": np.sin(t)}, t >= 0.0, 0.1, [m.source for m in MECHANISMS])
+    smooth = {s.mechanism.name for s in made if s.coordinates == ("t",) and not s.mechanism.is_road}
+    assert smooth == {"torque", "accelerometer_gain", "slip_f", "slip_r"}
 
 
 @pytest.mark.parametrize("rise", [0.1, 16.0])
