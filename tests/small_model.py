@@ -141,13 +141,7 @@ def _profile(pairs: tuple[tuple[float, float], ...], t: Array) -> Array:
 
 
 def simulate(drive: Drive) -> dict[str, Array]:
-    """Simulate a drive.
-
-    Returns
-    -------
-    mapping name -> array (n,)
-        Canonical signals at `rate_hz` in SI, plus truth in names that begin with `true_`.
-    """
+    """Simulate a drive: canonical signals (n,) at `rate_hz` in SI, plus truth in names that begin with `true_`."""
     vehicle = drive.vehicle
     rng = np.random.default_rng(drive.seed)
     n = round(drive.duration_s / STEP)

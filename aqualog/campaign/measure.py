@@ -17,6 +17,7 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, DriveResult, Event, FileFaults, FloatArray, Remark, Signals, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.braking import HOLD, BrakeWatch
+from aqualog.detect.detector import any_wheel
 from aqualog.detect.long import detect_long, present_in
 from aqualog.detect.slip_slope import activation
 from aqualog.detect.slip_slope.direct import SMOOTHING
@@ -261,7 +262,7 @@ class Thinning:
         braking = BrakeWatch(vehicle, dt).push(f, columns)
         reason = activation.inactive_reason(
             v_x=f["v_x_hat"], a_x=f["a_kin_slow"], a_y=f["a_y_slow"], yaw_rate=f["yaw_rate_slow"],
-            a_w_delta=np.zeros(n), is_braking=np.any(list(braking.values()), axis=0), limits=LIMITS,
+            a_w_delta=np.zeros(n), is_braking=any_wheel(braking), limits=LIMITS,
         )  # fmt: skip
         out: dict[str, FloatArray | BoolArray] = {
             "t": np.round((samples * step + step // 2) * dt, 6),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -10,16 +11,23 @@ from aqualog.core.compiled import compiled
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
+from aqualog.features.smoothing import UNSET, gain
 from aqualog.physics.load import G
 
 __all__ = [
-    "A_BRAKING", "BRAKE_PRESSURE", "HOLD", "TRACTION", "BrakeWatch", "began_free", "hold_on", "is_braking", "lasting",
+    "A_BRAKING", "BRAKE_PRESSURE", "HOLD", "LIGHT", "TRACTION", "UNLOGGED", "BrakeWatch", "began_free", "hold_on",
+    "is_braking", "lasting",
 ]  # fmt: skip
 
 A_BRAKING = -2.0  # [m/s^2] neither rolling, air nor water resistance decelerates a car more than that
 BRAKE_PRESSURE = 3e5  # [Pa] above the offset and residual pressure of a released brake
 TRACTION = -0.10  # [-] wheel torque over radius and load; lifting off stays above: it is what a driver does on water
 ONE_SIDED, RELEASED = -0.05, -0.02  # [-] of one wheel of an axle and of the other one where stability control brakes
+UNLOGGED = "unlogged"  # beside the wheels: a light braking that the torques do not know
+LIGHT = 0.5e5  # [Pa] above what the released brake of this car shows
+HOLDS = 0.7  # of what slows the car down by pressure: a torque that knows the brakes explains that much (K)
+KNOWN = 1e10  # [Pa^2 s] one second of braking with 1 bar more tells whether torques know the brakes
+TAU_RELEASED = 1.0  # [s]
 HOLD = 0.3  # [s] brakes and wheels need this long to settle after release
 
 
@@ -53,20 +61,9 @@ def _hold_on(samples, left, x):  # type: ignore[no-untyped-def]
 
 
 def hold_on(x: BoolArray, state: int, *, seconds: float, dt: float) -> tuple[BoolArray, int]:
-    """Keep a bit on for a while after it goes off.
+    """Keep a bit (n,) on for so many seconds after it goes off; `dt` is the sample time. [s]
 
-    Parameters
-    ----------
-    x : bool array (n,)
-    state : int
-        Samples left; 0, or the return value of the call before.
-    seconds, dt : float
-        How long; sample time. [s]
-
-    Returns
-    -------
-    y : bool array (n,)
-    state : int
+    `state`, samples left: 0, or the return value of the call before. Returns the bits and the state.
     """
     y, left = _hold_on(max(1, round(seconds / dt)), state, x)
     return y, int(left)
@@ -113,16 +110,42 @@ def began_free(active: BoolArray, braking: BoolArray, state: tuple[bool, bool]) 
     return y, (bool(was_active), bool(free))
 
 
+@compiled
+def _unlogged(rolling, gain, dt, s, pressure, push, left):  # type: ignore[no-untyped-def]
+    out = np.zeros(pressure.size, np.bool_)
+    for i in range(pressure.size):
+        p, a, r = pressure[i], push[i], left[i]
+        if math.isnan(p + a + r):
+            continue
+        if a > rolling:  # nobody brakes who drives
+            s[0] = p if math.isnan(s[0]) else s[0] + gain * (p - s[0])
+        p -= s[0]
+        if a < 0.0 and not math.isnan(p):
+            s[1] += dt
+            s[2] += dt * p
+            s[3] += dt * p * p
+            for k, x in ((4, a), (6, r)):
+                s[k] += dt * x
+                s[k + 1] += dt * p * x
+        square = s[3] * s[1] - s[2] * s[2]
+        by_torque, beside = s[2] * s[4] - s[1] * s[5], s[1] * s[7] - s[2] * s[6]
+        holds = square > KNOWN * s[1] and by_torque > HOLDS * (by_torque + beside)
+        out[i] = p > LIGHT and not holds
+    return out
+
+
 class BrakeWatch:
     """Find the wheels with a braking force, with its after-effects."""
 
     def __init__(self, vehicle: Vehicle, dt: float) -> None:
         self._vehicle = vehicle
         self._dt = dt
-        self._left = dict.fromkeys(WHEELS, 0)
+        self._left = dict.fromkeys((*WHEELS, UNLOGGED), 0)
+        # pressure of the released brake; of the overrun: time, pressure, its square; push, resistance, both by pressure
+        self._pressed = np.array([UNSET, *[0.0] * 7])
 
     def push(self, f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray]) -> dict[str, BoolArray]:
-        """Return bits (n,) by wheel; `columns` holds the torques that the drive has."""
+        """Return bits (n,) by wheel, and of `UNLOGGED`; `columns` holds the torques that the drive has."""
         weight = 0.25 * self._vehicle.mass * G
         known = [w for w in WHEELS if f"torque_{w}" in columns]
         shares = {w: columns[f"torque_{w}"] / (self._vehicle.arm(w) * weight) for w in known}
@@ -133,7 +156,26 @@ class BrakeWatch:
             if alone is not None:
                 bits = bits & ~(alone & (shares[wheel] > RELEASED))
             result[wheel], self._left[wheel] = hold_on(bits, self._left[wheel], seconds=HOLD, dt=self._dt)
+        result[UNLOGGED], self._left[UNLOGGED] = hold_on(
+            self._light(f, columns), self._left[UNLOGGED], seconds=HOLD, dt=self._dt
+        )
         return result
+
+    def _light(self, f: Mapping[str, FloatArray], columns: Mapping[str, FloatArray]) -> BoolArray:
+        """Where more than the pressure of the released brake slows the car down, and maybe no torque says so. (n,)
+
+        On the overrun the torques fall with the pressure if they know the brakes; else the resistance grows with it.
+        """
+        vehicle, pressure = self._vehicle, f.get("brake_pressure")
+        if pressure is None or "delta_a_x" not in f:
+            return np.zeros(f["a_kin_slow"].size, dtype=bool)
+        push = sum(columns[f"torque_{w}"] / vehicle.arm(w) for w in WHEELS if f"torque_{w}" in columns) / vehicle.mass
+        self._pressed = self._pressed.copy()
+        found = _unlogged(
+            vehicle.rolling_resistance * G, gain(TAU_RELEASED, self._dt), self._dt, self._pressed, pressure, push,
+            f["delta_a_x"],
+        )  # fmt: skip
+        return np.asarray(found)
 
 
 def _one_sided(shares: Mapping[str, FloatArray]) -> BoolArray:

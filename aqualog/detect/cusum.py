@@ -64,22 +64,10 @@ def _scan(p, g, active, x):  # type: ignore[no-untyped-def]
 
 
 def scan(p: CusumParams, state: CusumState, x: FloatArray) -> tuple[FloatArray, BoolArray, CusumState]:
-    """Sum a signal over a drive or a piece of one.
+    """Sum a signal x (n,) over a drive or a piece of one; `state` from `initial_state` or the piece before.
 
-    Parameters
-    ----------
-    state : CusumState
-        From `initial_state` or the piece before.
-    x : array (n,)
-        NaN: sum held, statistic NaN, no alarm.
-
-    Returns
-    -------
-    g : array (n,)
-        Statistic in units of x * s, never negative.
-    active : bool array (n,)
-        From g > h until g <= off_share h.
-    state : CusumState
+    NaN: sum held, statistic NaN, no alarm. Returns the statistic g (n,) in units of x * s, never negative; where it is
+    active (n,), from g > h until g <= off_share h; and the state.
 
     x and h scaled alike give the same alarms; no reset after an alarm.
     Thesis: Eq. (3.24) and the text under 2.4 and 2.10.
@@ -119,25 +107,12 @@ def _ages(dt, peak, since, after, g, active):  # type: ignore[no-untyped-def]
 
 
 def ages(dt: float, state: Ages, g: FloatArray, active: BoolArray) -> tuple[FloatArray, FloatArray, Ages]:
-    """Estimate when a change began and ended from its sum, which is late at both ends.
+    """Estimate when a change began and ended from its sum, which is late at both ends; `dt` [s].
 
-    Parameters
-    ----------
-    dt : float
-        [s]
-    state : Ages
-        From `new_ages` or the piece before.
-    g, active : array (n,)
-        Statistic and alarm of `scan`. NaN: time goes on, and a sum of zero stays zero.
-
-    Returns
-    -------
-    since : array (n,)
-        Seconds since the sum left zero: the estimate of when a change began (Page [page1954]).
-    after : array (n,)
-        Seconds since the sum of an alarm was at its largest, which with a clamp is as long as the change lasts. What
-        follows is decay.
-    state : Ages
+    `state` from `new_ages` or the piece before; `g`, `active` (n,) statistic and alarm of `scan`. NaN: time goes on,
+    and a sum of zero stays zero. Returns `since` (n,), seconds since the sum left zero: the estimate of when a change
+    began (Page [page1954]); `after` (n,), seconds since the sum of an alarm was at its largest, which with a clamp is
+    as long as the change lasts, and what follows is decay; and the state.
     """
     since, after, *last = _ages(dt, *state, np.ascontiguousarray(g, dtype=np.float64), np.ascontiguousarray(active))
     return since, after, Ages(*(float(x) for x in last))

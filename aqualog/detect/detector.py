@@ -12,6 +12,7 @@ import numpy as np
 from aqualog.core.notation import WHEELS, side_of
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.core.vehicle import Vehicle
+from aqualog.detect.braking import UNLOGGED
 from aqualog.detect.events import Evidence, Explain, Severity, as_they_are
 from aqualog.detect.slip_slope.history import Memory
 from aqualog.features.stream import Features
@@ -117,8 +118,9 @@ class Scene:
 
     @property
     def is_braking(self) -> BoolArray:
-        """Return whether a braking force acts on any wheel. (n,)"""
-        return any_wheel(self.braking)
+        """Return whether a braking force acts on any wheel, or may act where no torque says so. (n,)"""
+        bits = any_wheel(self.braking)
+        return bits | self.braking.get(UNLOGGED, bits)
 
     @property
     def one_side_braked(self) -> BoolArray:

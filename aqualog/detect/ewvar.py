@@ -64,20 +64,10 @@ def _scan(p, mean, var, x):  # type: ignore[no-untyped-def]
 
 
 def scan(p: EwvarParams, state: EwvarState, x: FloatArray) -> tuple[FloatArray, FloatArray, EwvarState]:
-    """Compute moving mean and variance of a signal.
+    """Compute moving mean and variance (n,) of a signal (n,); `state` from `initial_state` or the piece before.
 
-    Parameters
-    ----------
-    state : EwvarState
-        From `initial_state` or the piece before.
-    x : array (n,)
-        NaN: state held, output NaN.
-
-    Returns
-    -------
-    mean, variance : array (n,)
-        In units of x and x^2; the variance is never negative and does not depend on an offset of x.
-    state : EwvarState
+    NaN: state held, output NaN. Mean and variance are in units of x and x^2; the variance is never negative and does
+    not depend on an offset of x. The state comes after them.
 
     With alpha = beta this is the weighted variance exactly; otherwise white noise of variance s^2 gives
     (1 - beta) 2 / (2 - alpha) s^2 (E4). The form is that of Finch [finch2009] and West [west1979].

@@ -62,43 +62,19 @@ def _derivative(k, dt, y, x):  # type: ignore[no-untyped-def]
 
 
 def lowpass(x: FloatArray, state: float, *, tau: float, dt: float) -> tuple[FloatArray, float]:
-    """Low-pass y += (1 - exp(-dt / tau)) (x - y), starting at the first sample.
+    """Low-pass y += (1 - exp(-dt / tau)) (x - y) of an input (n,), starting at the first sample.
 
-    Parameters
-    ----------
-    x : array (n,)
-        Input. NaN: state held, output NaN.
-    state : float
-        `UNSET`, or the return value of the call before.
-    tau, dt : float
-        Time constant, sample time. [s]
-
-    Returns
-    -------
-    y : array (n,)
-    state : float
+    NaN: state held, output NaN. `state`: `UNSET`, or the return value of the call before; `tau` time constant, `dt`
+    sample time [s]. Returns y (n,) and the state.
     """
     y, last = _lowpass(gain(tau, dt), state, np.ascontiguousarray(x, dtype=np.float64))
     return y, last
 
 
 def fading_lowpass(x: FloatArray, state: float, *, tau: float, fade: float, dt: float) -> tuple[FloatArray, float]:
-    """Low-pass that bridges gaps: the last value fades to zero.
+    """Low-pass of an input (n,) that bridges gaps: the last value fades to zero with the time constant `fade`. [s]
 
-    Parameters
-    ----------
-    x : array (n,)
-        Input. NaN: the value held, fading with the time constant `fade`.
-    state : float
-        0, or the return value of the call before.
-    tau, fade, dt : float
-        [s]
-
-    Returns
-    -------
-    y : array (n,)
-        Never NaN.
-    state : float
+    `state`: 0, or the return value of the call before; `tau`, `dt` [s]. Returns y (n,), never NaN, and the state.
 
     For corrections whose loss must not hide the corrected signal: a lost yaw rate must not blind the wheel detectors.
     """
@@ -107,22 +83,10 @@ def fading_lowpass(x: FloatArray, state: float, *, tau: float, fade: float, dt: 
 
 
 def derivative(x: FloatArray, state: float, *, tau: float, dt: float) -> tuple[FloatArray, float]:
-    """Time derivative of the low-passed input.
+    """Time derivative (n,) [unit of x / s] of the low-passed input (n,), and the state.
 
-    Parameters
-    ----------
-    x : array (n,)
-        Input. NaN: restarts after the gap; the first sample and the first after a gap give NaN.
-    state : float
-        `UNSET`, or the return value of the call before.
-    tau, dt : float
-        Time constant, sample time. [s] tau = 0 is the backward difference.
-
-    Returns
-    -------
-    dx_dt : array (n,)
-        [unit of x / s]
-    state : float
+    NaN: restarts after the gap; the first sample and the first after a gap give NaN. `state`: `UNSET`, or the return
+    value of the call before; `tau` time constant, 0 for the backward difference, `dt` sample time [s].
 
     A plain difference of 10 ms samples of a wheel speed carries 1 m/s² rms of tooth noise, and five times that at
     500 Hz; the time constant makes it one quantity.

@@ -97,25 +97,10 @@ def pavdrn_speed(h_w: FloatArray) -> FloatArray:
 def gallaway_speed(
     h_w: FloatArray, p: FloatArray, *, tread_depth: float, texture_depth: float, spin_down: float = 10.0
 ) -> FloatArray:
-    """Hydroplaning speed after Gallaway: v = SD^0.04 P^0.3 (TD + 1)^0.06 A mph.
+    """Hydroplaning speed after Gallaway: v = SD^0.04 P^0.3 (TD + 1)^0.06 A mph. [m/s]
 
-    Parameters
-    ----------
-    h_w : array
-        Water film, > 0. [m]
-    p : array
-        Inflation pressure. [Pa]
-    tread_depth : float
-        [m]
-    texture_depth : float
-        Mean texture depth of the road. [m]
-    spin_down : float
-        Criterion: loss of wheel speed. [%]
-
-    Returns
-    -------
-    v : array
-        [m/s]
+    `h_w` water film, > 0 [m]; `p` inflation pressure [Pa]; `tread_depth`, `texture_depth` mean of the road's [m];
+    `spin_down` criterion, loss of wheel speed [%].
 
     P in psi, TD in 1/32 inch, A = max(10.409 / h^0.06 + 3.507, (28.952 / h^0.06 - 7.817) MTD^0.14), inch. 220 kPa,
     1.6 mm of tread and 0.78 mm of texture give 93 to 85 km/h for 0.6 to 2 mm.

@@ -153,6 +153,7 @@ def rows():
     yield "diagnosis", f"| `--level` | {Options().level:g} |"
     yield "diagnosis", f"| `--surrogates` | {Options().surrogates} |"
     yield "detectors", f"| brake pressure | above {braking.BRAKE_PRESSURE / 1e5:g} bar |"
+    yield "detectors", f"| {braking.LIGHT / 1e5:g} bar above the released brake |"
     yield "detectors", f"| held after release | {braking.HOLD:g} s |"
     for k in TYRE_KEYS.values():
         yield "simulation", f"| `{k.name}` | {k.unit} | {k.default:g} |"

@@ -20,20 +20,9 @@ SPELT: dict[type[ast.AST], str] = {
 
 @dataclass(frozen=True, slots=True)
 class Break:
-    """One change of one line.
+    """One change of one line, from 1, of a file, from the root of the checkout.
 
-    Parameters
-    ----------
-    path : str
-        File, from the root of the checkout.
-    line : int
-        From 1.
-    start, end : int
-        Bytes of the line that are replaced.
-    old, new : str
-        What stands there, and what comes there.
-    function : str
-        Where it stands.
+    Bytes `start` to `end` of the line are replaced: there stands `old`, and comes `new`. It stands in `function`.
     """
 
     path: str

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from aqualog.core.notation import WHEELS
-from aqualog.detect.braking import BrakeWatch, began_free, hold_on, is_braking
+from aqualog.detect.braking import UNLOGGED, BrakeWatch, began_free, hold_on, is_braking
 from tests.drives import CAR
 
 
@@ -51,3 +51,20 @@ def test_a_pressure_brakes_the_wheels_that_torques_say(torque, known, expected):
     braking = BrakeWatch(CAR, 0.01).push(f, columns)
     assert [w for w in WHEELS if braking[w].all()] == expected
     assert not any(braking[w].any() for w in WHEELS if w not in expected)
+
+
+@pytest.mark.parametrize(("bar", "offset", "logged", "expected"), [
+    (1.0, 0.0, 0.0, True), (1.0, 2.0, 0.0, True), (0.3, 2.0, 0.0, False), (1.0, 0.0, 1.0, False), (1.0, 0.0, 0.4, True),
+])  # fmt: skip
+def test_a_light_braking_that_no_torque_knows(bar, offset, logged, expected):
+    """2 s of driving, 4 s of overrun, then the brake: the released pressure is learnt, and what the torque holds of it."""
+    t = np.arange(1200) * 0.01
+    push, pressed = np.where(t < 2.0, 0.5, -0.7), np.where(t > 6.0, bar + 0.2 * np.sin(t), 0.0)
+    slows = 0.15 * pressed
+    columns = {f"torque_r{s}": 0.5 * CAR.mass * CAR.r_e_r * (push - logged * slows) for s in "lr"}
+    f = {"a_kin_slow": push - slows, "brake_pressure": 1e5 * (pressed + offset), "delta_a_x": (1.0 - logged) * slows}
+    whole, watch = BrakeWatch(CAR, 0.01).push(f, columns)[UNLOGGED], BrakeWatch(CAR, 0.01)
+    pieces = [[{n: x[a : a + 7] for n, x in d.items()} for d in (f, columns)] for a in range(0, 1200, 7)]
+    assert (np.concatenate([watch.push(*piece)[UNLOGGED] for piece in pieces]) == whole).all()
+    assert not whole[:600].any()
+    assert whole[900:].all() if expected else not whole[900:].any()

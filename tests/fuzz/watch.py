@@ -22,10 +22,7 @@ def watched(
 ) -> dict[str, float]:
     """Fuzz for so long; findings go to `tell` as lines of the corpus.
 
-    Returns
-    -------
-    dict
-        cases, wrong, faults, slowest_s, peak_mb; `ended`: how often a case has ended the process.
+    Returns cases, wrong, faults, slowest_s, peak_mb; `ended`: how often a case has ended the process.
     """
     total: dict[str, float] = {"cases": 0, "wrong": 0, "faults": 0, "slowest_s": 0.0, "peak_mb": 0, "ended": 0}
     end = time.monotonic() + seconds

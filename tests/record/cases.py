@@ -27,26 +27,17 @@ CANEDGE_LOG = f"{CANEDGE}/00000001-60FE3F04.MF4 --dbc {CANEDGE}/canmod-gps.dbc"
 THESIS = "given/few.toml"
 TRIPS = "given/trips.toml"
 DAMAGED = "damaged/"
+MONDAY = f"{S}/loaded_monday.parquet {CAR}"
+LOADED = f"{S}/loaded_monday.parquet {S}/loaded_friday.parquet"
 
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """One command line and what is kept of it.
+    """One command line, arguments of `aqualog`, and what is kept of it in the record's file `name`.
 
-    Parameters
-    ----------
-    name : str
-        Its file in the record.
-    line : str
-        Arguments of `aqualog`.
-    keep : str
-        Glob of the written files whose values are kept.
-    only : tuple of str
-        Keys of the JSON document that are kept; empty: all.
-    is_long : bool
-        Left out unless asked for.
-    is_digest : bool
-        Whether the document is kept as one digest of its results, without its sentences.
+    `keep`: glob of the written files whose values are kept; `only`: keys of the JSON document that are kept, empty: all;
+    `is_long`: left out unless asked for; `is_digest`: the document is kept as one digest of its results, without its
+    sentences.
     """
 
     name: str
@@ -94,10 +85,7 @@ ONE_DRIVE = (
     Case("detect_fail_on_event", f"detect {S}/lane_drive.parquet {CAR} --json --fail-on-event"),
     Case("detect_thresholds", f"detect {S}/lane_drive.mf4 {CAR} --thresholds given/thresholds.toml --json"),
     Case("detect_model", f"detect {S}/loaded_friday.parquet {CAR} --model given/model.toml --json"),
-    Case(
-        "detect_history",
-        f"detect {S}/loaded_monday.parquet {CAR} --history {{o}}/history.json --configuration four --json",
-    ),
+    Case("detect_history", f"detect {MONDAY} --history {{o}}/history.json --configuration four --json"),
     Case("detect_cache", f"detect {S}/lane_drive.mf4 {CAR} --cache --json"),
     Case("cache", "cache --json", only=("drives",)),
     Case("cache_clean", "cache --clean --json", only=("drives",)),
@@ -118,7 +106,7 @@ ONE_DRIVE = (
         "--write-map {o}/map.toml",
     ),
     Case("align_text", f"align {RAV4}/speed.csv {RAV4}/gnss.csv"),
-    Case("slip_slope", f"slip-slope {S}/loaded_monday.parquet {CAR} --json -o {{o}}/out"),
+    Case("slip_slope", f"slip-slope {MONDAY} --json -o {{o}}/out"),
     Case("slip_slope_text", f"slip-slope {S}/loaded_friday.parquet {CAR} --method velocity --delay 0.0"),
     Case("slip_slope_wet", f"slip-slope {S}/lane_drive.mf4 {CAR} --json"),
     Case(
@@ -126,11 +114,8 @@ ONE_DRIVE = (
         f"slip-slope {PORSCHE} --vehicle cars/porsche.toml --signals cars/porsche_slope_map.toml "
         "--traction accelerometer --mu-max 0.5 --json -o {o}/out",
     ),
-    Case("calibrate", f"calibrate {S}/loaded_monday.parquet {S}/loaded_friday.parquet {CAR} --json -o {{o}}/car.toml"),
-    Case(
-        "calibrate_text",
-        f"calibrate {S}/loaded_monday.parquet {S}/loaded_friday.parquet {CAR} --fix mass=1890 --page {{o}}/page.html",
-    ),
+    Case("calibrate", f"calibrate {LOADED} {CAR} --json -o {{o}}/car.toml"),
+    Case("calibrate_text", f"calibrate {LOADED} {CAR} --fix mass=1890 --page {{o}}/page.html"),
     Case(
         "calibrate_bmw",
         f"calibrate {BMW}/TripA05.csv {BMW}/TripA10.csv {BMW}/TripA11.csv {BMW}/TripB26.csv {BMW_RAW} --json "
@@ -138,16 +123,13 @@ ONE_DRIVE = (
     ),
     Case(
         "diagnose",
-        f"diagnose {S}/loaded_monday.parquet {CAR} --holdout {S}/loaded_friday.parquet --surrogates 9 --json "
-        "-o {o}/model.toml --page {o}/page.html",
+        f"diagnose {MONDAY} --holdout {S}/loaded_friday.parquet --surrogates 9 --json -o {{o}}/model.toml --page {{o}}/page.html",
     ),
     Case("validate", f"validate {S}/lane_drive.mf4 {CAR} --no-why --json"),
-    Case(
-        "validate_text", f"validate {S}/loaded_monday.parquet {S}/loaded_friday.parquet {CAR} --no-why --method 18571"
-    ),
+    Case("validate_text", f"validate {LOADED} {CAR} --no-why --method 18571"),
     Case("watch", f"watch {S} --campaign {THESIS} --once --json", keep="none/*"),
     Case("diagnose_text", f"diagnose {S}/loaded_friday.parquet {CAR} --no-bootstrap"),
-    Case("diagnose_model", f"diagnose {S}/loaded_monday.parquet {CAR} --model given/model.toml --no-bootstrap --json"),
+    Case("diagnose_model", f"diagnose {MONDAY} --model given/model.toml --no-bootstrap --json"),
     Case("diagnose_wet", f"diagnose {S}/lane_drive.mf4 {CAR} --no-bootstrap --json"),
     Case(
         "diagnose_rav4",
@@ -181,7 +163,7 @@ CAMPAIGNS = (
     Case("plan", f"plan {THESIS} --json --sample 2", only=("logs", "measured", "formats", "in_store", "to_measure")),
     Case("batch", f"batch {THESIS} -o {{o}}/store --json", keep="store/**/*"),
     Case("batch_shard", f"batch {THESIS} -o {{o}}/store --shard 1/3 --json", keep="store/*.parquet"),
-    Case("batch_logs", f"batch {S}/lane_drive.mf4 {S}/loaded_monday.parquet {CAR} -o {{o}}/store --json"),
+    Case("batch_logs", f"batch {S}/lane_drive.mf4 {MONDAY} -o {{o}}/store --json"),
     Case("bin_slipslope", f"bin-slipslope {THESIS} --json -o {{o}}/rows.csv"),
     Case("bin_slipslope_by", f"bin-slipslope {THESIS} --by tyre,pressure,water-depth --robust --json"),
     Case("bin_slipslope_dry", f"bin-slipslope {THESIS} --by tyre --road both --bin-width 20"),
