@@ -24,7 +24,7 @@ from aqualog.physics.tyre_brush import brush_force
 from aqualog.report.drive.document import document
 from aqualog.report.drive.panels import drive_rows
 from aqualog.report.drive.report import drive_report
-from tests.drives import CAR, drive, lane
+from tests.drives import CAR, FWD, drive, lane
 from tests.margin.learn import DRIVETRAINS, inputs_of, windows
 from tests.margin.passes import LAWS, any_tyre, own_full, own_pass
 
@@ -98,6 +98,27 @@ def test_a_wet_drive_has_a_distance_and_a_warning(wet):
     assert low <= wet.margin.least <= high
     assert entry < wet.margin.warned_s < entry + 2.0
     assert any(e.detector == "margin" for e in wet.events)
+
+
+@pytest.mark.parametrize(("car", "kmh"), [(CAR, 104.0), (CAR, 110.0), (FWD, 110.0), (FWD, 115.0)])
+def test_a_wheel_that_has_stopped_teaches_nothing_of_the_dry_road_behind(car, kmh):
+    speed = ((0.0, kmh), (12.0, kmh), (13.0, kmh - 4.0), (26.0, kmh - 50.0))
+    columns = drive(car, duration_s=26.0, lanes=(lane(8.0, 12.0, 2.5e-3),), speed_kmh=speed, seed=1)[0]
+    found = detect_drive(columns, car)
+    assert not [e for e in found.events if e.detector == "margin" and e.end_s > 12.5]
+    assert found.margin is None or 8.0 < found.margin.at_s < 12.5
+
+
+def test_slips_of_full_aquaplaning_count_where_nothing_shakes():
+    t = emissions_of("awd").in_columns()
+    near, far = (int(np.argmin(np.abs(NODES - x))) for x in (0.0, 0.55))
+    z, P, n = np.array([1.0, np.log(80 / 108), np.arcsinh(8.0)]), np.array([1.0, 0.1, 0.1, 4.0, 4.0]), t.mean.shape[2]
+    x, score = np.array([1.7, 6.0, 6.0, 0.0, 0.0]), np.empty((2, n))
+    for k, calm in enumerate((0.0, 0.3)):
+        work = np.full(n, calm), np.empty((5, 5, n)), np.empty((9, n))
+        recursion._scores(t.mean, t.scatter, z, x, P, 6.0, *work, score[k])
+    never, sometimes = score[:, near] - score[:, far]
+    assert sometimes > max(never + 1.5, 3.0)
 
 
 def test_document_and_page(wet):

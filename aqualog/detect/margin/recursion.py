@@ -34,6 +34,8 @@ _brush_slip = inlined(brush_slip)
 _NV, _NX, _NN = FULL_SPEEDS.size, len(FEATURES), NODES.size
 _LOG = np.log(FULL_SPEEDS)
 _QUANTILES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
+_SURE = 1.645  # standard deviations of a quantile of 95 %
+_STILL = 0.25  # variance of what wheels shake that shake as on dry road, of 0.6 s in log variance
 _UNKNOWN = 1e4  # variance of a feature that is missing
 _V, _A, _R, _D, _U_F, _U_R, _VAR, _S_F, _S_R = 0, 1, 2, 3, 5, 7, 9, 11, 13  # columns of a step
 _LEAST = 1e-10  # of a slip's variance
@@ -46,13 +48,16 @@ def _slip(u, slope, rolling, friction):  # type: ignore[no-untyped-def]
 
 
 @part
-def _learn_line(s, x, left, lasting, trust):  # type: ignore[no-untyped-def]
+def _learn_line(s, x, left, lasting, trust, tail):  # type: ignore[no-untyped-def]
     """Learn offset and slope of a line, `s[0]` and `s[1]`, by Kalman's filter; their covariance follows them.
 
-    `left` is what was seen at x less the line, `lasting` its variance beside the line's, `trust` 0 to 1.
+    `left` is what was seen at x less the line, `lasting` its variance beside the line's, `trust` 0 to 1. By Student's
+    law with `tail` degrees of freedom the further it lies from the line the less it counts: a wheel that floats slips
+    hundredfold, and what little of it was trusted would bend the line for minutes.
     """
     P_m, P_q = s[2] + x * s[3], s[3] + x * s[4]
     S = P_m + x * P_q + lasting
+    trust *= (tail + 1.0) / (tail + max(left * left / S, 1.0))
     gain_m, gain_q = trust * P_m / S, trust * P_q / S
     s[0] += gain_m * left
     s[1] += gain_q * left
@@ -68,7 +73,7 @@ def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
     g[2] = min(g[2] + p.walk_R**2 * p.dt, p.offset_R**2)
     g[4] = min(g[4] + p.walk_a**2 * p.dt, p.share_a**2)
     if not math.isnan(row[_R] + row[_A]):
-        _learn_line(g, row[_A], row[_R] - g[0] - g[1] * row[_A], p.noise_R**2, trust)
+        _learn_line(g, row[_A], row[_R] - g[0] - g[1] * row[_A], p.noise_R**2, trust, p.tail)
     for i in range(2):
         g = m.sides[i]
         g[2] = min(g[2] + p.walk_D**2 * p.dt, p.offset_D**2)
@@ -77,7 +82,7 @@ def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
         if math.isnan(row[_D + i] + front + rear):
             continue
         away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
-        _learn_line(g, front + rear, away, p.noise_D**2 + row[_VAR + i], trust)
+        _learn_line(g, front + rear, away, p.noise_D**2 + row[_VAR + i], trust, p.tail)
 
 
 @part
@@ -126,16 +131,22 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
 
 
 @partial(part, is_inline=False)  # from two places: its code once
-def _scores(mean, scatter, z, x, P, tail, A, y, score):  # type: ignore[no-untyped-def]
+def _scores(mean, scatter, z, x, P, tail, calm, A, y, score):  # type: ignore[no-untyped-def]
     """Fill log likelihoods (k,) of the features x by Student's law, of means by covariates z and covariances.
 
     `mean` (features, covariates, k), `scatter` (features, features, k): the compiler makes vectors of the innermost
     loops, over k. A covariance is A D A', with ones and 1 / D on the diagonal of A: no roots, and one logarithm.
+    `calm` (k,): probability that wheels shake as on dry road, whatever drag and slips show.
     """
     n, determinant, square = score.size, y[_NX], y[_NX + 1]
+    still, shakes = (P[3] + _STILL) * (P[4] + _STILL), x[3] * x[3] / (P[3] + _STILL) + x[4] * x[4] / (P[4] + _STILL)
     determinant[:] = 1.0
     square[:] = 0.0
     for i in range(_NX):
+        if i == 3:  # drag and slips are through
+            for k in range(n):
+                y[_NX + 2, k] = determinant[k] * still
+                y[_NX + 3, k] = square[k] + shakes
         for k in range(n):
             y[i, k] = x[i]
             A[i, i, k] = scatter[i, i, k] + P[i]
@@ -159,6 +170,9 @@ def _scores(mean, scatter, z, x, P, tail, A, y, score):  # type: ignore[no-untyp
             square[k] += y[i, k] * y[i, k] * A[i, i, k]
     for k in range(n):
         score[k] = -0.5 * math.log(determinant[k]) - 0.5 * (tail + _NX) * math.log1p(square[k] / tail)
+        if calm[k] > 0.0:
+            more = -0.5 * math.log(y[_NX + 2, k]) - 0.5 * (tail + _NX) * math.log1p(y[_NX + 3, k] / tail) - score[k]
+            score[k] += math.log((1.0 - calm[k]) + calm[k] * math.exp(min(more, 300.0)))
 
 
 @part
@@ -201,10 +215,12 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
 @part
 def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
     """Let the window speak: probabilities of the kinds of road, evidence on the full speeds."""
-    z, known, P, A, y, score, nodes, _ = s
+    z, known, P, A, y, score, nodes, _, even = s
     z[0], z[1], z[2] = 1.0, math.log(v / 30.0), math.asinh(traction / 0.02)
     known[0], known[1], known[2] = 1.0, z[1], min(z[2], p.most_u)
-    _scores(t.kind_mean, t.kind_scatter, known, m.x[0], m.x[1], p.tail, A, y, score)
+    for k in range(score.size):
+        even[k] = p.calm_road if t.road[k] == 1 else 0.0
+    _scores(t.kind_mean, t.kind_scatter, known, m.x[0], m.x[1], p.tail, even, A, y, score)
     best = -1e300
     for k in range(score.size):
         score[k] = p.weight * score[k]
@@ -221,7 +237,9 @@ def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
     P[0], P[3], P[4] = P[0] + p.law_R**2, P[3] + p.law_M**2, P[4] + p.law_M**2
     keep, log_v, heard = math.exp(-p.dt / p.keep_s), math.log(v), _is(t, m, 1) > p.heard
     if heard:
-        _scores(t.mean, t.scatter, z, m.x[0], P, p.tail, A, y, nodes)
+        for k in range(nodes.size):
+            even[k] = p.calm
+        _scores(t.mean, t.scatter, z, m.x[0], P, p.tail, even, A, y, nodes)
     for i in range(_NV):
         n, a = _place(log_v, i)
         for law in range(t.law.size):
@@ -269,12 +287,15 @@ def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
             q += 1
         total += here
         edge += LOG_STEP
-    # without a slip the distance is what was assumed before: no reason to warn
-    m.out[1] = near * wet if m.x[1, 1] < _UNKNOWN else 0.0
+    # without a slip that is known the distance is what was assumed before: no reason to warn
+    m.out[1] = near * wet if m.x[1, 1] < p.vague else 0.0
     m.out[7] = L
-    # a tyre that loses its air only slips, and alone
-    x, drags = m.x[0], m.x[1, 0] >= _UNKNOWN or m.x[0, 0] > math.asinh(p.drags / p.scale_R)
-    both = x[1] * x[2] > 0.0 and abs(x[2]) > p.both
+    # what a car has not shown on dry road yet is no sign of water
+    x, P = m.x[0], m.x[1]
+    drag = max(math.asinh(p.drags / p.scale_R), _SURE * math.sqrt(P[0]))
+    drags = P[0] >= _UNKNOWN or x[0] > drag
+    # a tyre that loses its air only slips, and alone; a car that rolls easier than before has been taught by water
+    both = x[1] * x[2] > 0.0 and abs(x[2]) > max(p.both, _SURE * math.sqrt(P[2])) and x[0] > -drag
     m.out[8] = 1.0 if drags or both or max(x[3], x[4]) > p.shakes else 0.0
     m.out[9] = m.out[4] + v
 
@@ -289,10 +310,12 @@ def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
     m.samples[1] += 1.0
     v = row[_V]
     dry = _is(t, m, 0)
+    # a road that has only just become dry was none when the step was seen that leaves the window
+    since = dry * dry / (dry + (1.0 - dry) * p.to_dry * p.dt * ROWS)
     old = m.window[at]
     if not math.isnan(old[_V]):
         # slower, a road counts as dry whatever lies on it
-        _learn(p, m, old, dry if old[_V] > p.v_least else 1.0)
+        _learn(p, m, old, since if old[_V] > p.v_least else 1.0)
     for k in range(row.size):  # an assignment of arrays compiles a message about their shapes, for 4 s
         m.window[at, k] = row[k]
     _predict(p, t, m)
@@ -355,7 +378,7 @@ def _scan(p, t, m, x):  # type: ignore[no-untyped-def]
     # what a step works with and none remembers: parts that allocate nothing count no references
     s = (
         np.empty(COVARIATES), np.empty(COVARIATES), np.empty(_NX), np.empty((_NX, _NX, most)),
-        np.empty((_NX + 2, most)), np.empty(kinds), np.empty(nodes), np.empty((t.law.size, _NV)),
+        np.empty((_NX + 4, most)), np.empty(kinds), np.empty(nodes), np.empty((t.law.size, _NV)), np.empty(most),
     )  # fmt: skip
     _push(p, t, m, x, out, np.empty(m.window.shape[1]), s)
     return out

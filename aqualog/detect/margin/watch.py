@@ -83,8 +83,9 @@ class Least:
         """Take features (n,) and the detector's track of the next samples."""
         if track is None:
             return
-        # a distance by the resistance alone, without a slip, is no least one
-        margin = np.where(track.statistic > 0.0, features["aquaplaning_margin"], np.nan)
+        # a distance by the resistance alone, without a slip, is no least one, nor is a near one that the road shows not
+        counts = (track.statistic > 0.0) & (track.active | (track.statistic <= track.threshold))
+        margin = np.where(counts, features["aquaplaning_margin"], np.nan)
         if np.isfinite(margin).any():
             i = int(np.nanargmin(margin))
             if margin[i] < self._best[0]:
