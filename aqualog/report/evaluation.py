@@ -7,38 +7,14 @@ from dataclasses import asdict, replace
 from typing import Any
 
 from aqualog import __version__
+from aqualog.evaluate import score
 from aqualog.evaluate.gates import GateResult
 from aqualog.evaluate.records import Cell as Counts
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.run import Evaluation, Tuning
-from aqualog.evaluate.score import (
-    HOUR_S,
-    Rate,
-    Recall,
-    Score,
-    better_rivals,
-    confusion,
-    coverage,
-    grouped,
-    is_rival,
-    score_all,
-    situation_scores,
-)
 from aqualog.evaluate.sweep import RocPoint
+from aqualog.report import evaluation_words as words
 from aqualog.report.evaluation_figures import evaluation_figures
-from aqualog.report.evaluation_words import (
-    better_sentences,
-    coverage_sentences,
-    headline,
-    notes_of,
-    rate_text,
-    recall_text,
-    seconds_text,
-    short,
-    title_of,
-    tuning_sentences,
-    verdicts,
-)
 from aqualog.report.sections import Cell, Figures, Headline, Lines, Para, Report, Section, Table
 from aqualog.report.values import counted, fields_of, number, plain
 
@@ -80,19 +56,20 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = (), gates: 
         Limits that were to be kept.
     """
     records, tuning = evaluation.records, evaluation.tuning
-    scores, situations = score_all(records), situation_scores(records)
-    plots, answers = evaluation_figures(evaluation), verdicts(records)
+    scores, situations = score.score_all(records), score.situation_scores(records)
+    plots, answers = evaluation_figures(evaluation), words.verdicts(records)
     groups = [
         (", ".join(f"{k} {v}" for k, v in zip(by, key, strict=True)), some)
-        for key, some in (grouped(records, by).items() if by else ())
+        for key, some in (score.grouped(records, by).items() if by else ())
     ]
-    tuned = tuning_sentences(tuning, score_all(tuning.before), scores) if tuning else []
+    tuned = words.tuning_sentences(tuning, score.score_all(tuning.before), scores) if tuning else []
+    driven = sum(r.duration_s for r in records)
     sections = [
         Section("", [
-            Para(f"{counted(len(records), 'drive')}, {sum(r.duration_s for r in records) / HOUR_S:.3g} h", "text"),
-            Lines(answers or [headline(evaluation)]),
+            Para(f"{counted(len(records), 'drive')}, {driven / score.HOUR_S:.3g} h", "text"),
+            Lines(answers or [words.headline(evaluation)]),
         ], where="text"),
-        Section("", [Headline(headline(evaluation), answers)], "verdict", look="verdict open", where="page"),
+        Section("", [Headline(words.headline(evaluation), answers)], "verdict", look="verdict open", where="page"),
         Section("Gates", [Table(("Gate", "Found", "Kept"), [
             (g.gate.text, g.found, "yes" if g.is_kept else "no") for g in gates
         ], "gates")]),
@@ -104,7 +81,7 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = (), gates: 
             Table(_SCORES, _score_rows(scores), where="text"), Para(_LEGEND, where="text"),
         ]),
         *(
-            Section(f"{name} ({counted(len(some), 'drive')})", [Table(_SCORES, _score_rows(score_all(some)))],
+            Section(f"{name} ({counted(len(some), 'drive')})", [Table(_SCORES, _score_rows(score.score_all(some)))],
                     where="text")
             for name, some in groups
         ),
@@ -116,12 +93,13 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = (), gates: 
                 fold="curves"),
         *_situation_sections(records, situations),
         Section("Over thresholds", [Table(_ROC, [
-            (title_of(p.detector), f"{p.factor:.3g}", f"{p.threshold:.4g}", recall_text(p.full), recall_text(p.partial),
-             str(p.false_alarms.count), rate_text(p.false_alarms)) for p in evaluation.roc
+            (words.title_of(p.detector), f"{p.factor:.3g}", f"{p.threshold:.4g}", words.recall_text(p.full),
+             words.recall_text(p.partial), str(p.false_alarms.count), words.rate_text(p.false_alarms))
+            for p in evaluation.roc
         ])], where="text"),
-        Section("Rivals", [Lines(better_sentences(records), most=1000)], "rivals"),
+        Section("Rivals", [Lines(words.better_sentences(records), most=1000)], "rivals"),
         Section("Thresholds proposed", [Lines(tuned, most=1000)], "tuning"),
-        Section("Notes", [Lines(notes_of(records), most=1000)], "notes", where="page"),
+        Section("Notes", [Lines(words.notes_of(records), most=1000)], "notes", where="page"),
     ]  # fmt: skip
     return Report("evaluation", "detections against labels", sections, _facts(evaluation), plots, _FOOTER)
 
@@ -131,24 +109,24 @@ def _facts(evaluation: Evaluation) -> list[tuple[str, str]]:
     hours, dry, km = (sum(getattr(r, n) for r in records) for n in ("duration_s", "dry_s", "dry_m"))
     facts = [
         ("drives", str(len(records))),
-        ("driving", f"{number(hours / HOUR_S)} h"),
-        ("outside water", f"{number(dry / HOUR_S)} h, {number(km / 1e3)} km"),
+        ("driving", f"{number(hours / score.HOUR_S)} h"),
+        ("outside water", f"{number(dry / score.HOUR_S)} h, {number(km / 1e3)} km"),
     ]
     return [*facts, ("not readable", str(len(evaluation.failed)))] if evaluation.failed else facts
 
 
-def _score_rows(scores: Mapping[str, Score]) -> list[tuple[str | Cell, ...]]:
+def _score_rows(scores: Mapping[str, score.Score]) -> list[tuple[str | Cell, ...]]:
     return [
         (
-            Cell(title_of(n), note="rival" if is_rival(n) else ""),
+            Cell(words.title_of(n), note="rival" if score.is_rival(n) else ""),
             str(s.runs),
-            recall_text(s.full),
-            recall_text(s.partial),
-            recall_text(s.wheel_partial),
-            f"{seconds_text(s.partial.latency(0.5))} / {seconds_text(s.partial.latency(0.95))}",
+            words.recall_text(s.full),
+            words.recall_text(s.partial),
+            words.recall_text(s.wheel_partial),
+            f"{words.seconds_text(s.partial.latency(0.5))} / {words.seconds_text(s.partial.latency(0.95))}",
             number(100.0 * s.partial.before_share, 0),
             str(s.false_alarms.count),
-            rate_text(s.false_alarms),
+            words.rate_text(s.false_alarms),
             number(s.false_alarms.per_100km),
             str(s.on_water.count),
         )
@@ -159,7 +137,7 @@ def _score_rows(scores: Mapping[str, Score]) -> list[tuple[str | Cell, ...]]:
 
 def _configurations(groups: Sequence[tuple[str, Sequence[RunRecord]]]) -> Table:
     """The scores of all configurations in one table, without columns in which nothing was measured."""
-    rows = [(name, *row) for name, some in groups for row in _score_rows(score_all(some))]
+    rows = [(name, *row) for name, some in groups for row in _score_rows(score.score_all(some))]
     return _with_values(Table(("Configuration", *_SCORES), rows, "configurations", (0, 1), is_sortable=True))
 
 
@@ -175,39 +153,41 @@ def _with_values(table: Table) -> Table:
 
 def _confusion(records: Sequence[RunRecord]) -> Table:
     def share_text(c: Counts | None) -> str:
-        return "–" if c is None else f"{c.hit}/{c.episodes} · {short(_per_hour(c))}/h"
+        return "–" if c is None else f"{c.hit}/{c.episodes} · {words.short(_per_hour(c))}/h"
 
-    cells = confusion(records)
+    cells = score.confusion(records)
     names = list(dict.fromkeys(n for row in cells.values() for n in row))
-    rows = [(title_of(n), *(share_text(columns.get(n)) for columns in cells.values())) for n in names]
+    rows = [(words.title_of(n), *(share_text(columns.get(n)) for columns in cells.values())) for n in names]
     return Table(("Detector", *cells), rows, "confusion")
 
 
 def _per_hour(c: Counts) -> float:
-    return Rate(c.events, c.seconds, 0.0).per_hour
+    return score.Rate(c.events, c.seconds, 0.0).per_hour
 
 
-def _situation_sections(records: Sequence[RunRecord], situations: Mapping[str, Mapping[str, Score]]) -> list[Section]:
+def _situation_sections(
+    records: Sequence[RunRecord], situations: Mapping[str, Mapping[str, score.Score]]
+) -> list[Section]:
     """Tables of the situations for a terminal, where a page has figures, and the coverage."""
     if len(situations) < 2:
         return []
     names = [n for n in next(iter(situations.values())) if any(s[n].runs for s in situations.values())]
 
-    def recall(s: Score) -> str:
+    def recall(s: score.Score) -> str:
         return f"{100 * s.partial.share:.0f} % of {s.partial.episodes}" if s.runs and s.partial.episodes else "–"
 
-    def alarms(s: Score) -> str:
-        return short(s.false_alarms.per_hour) if s.runs and s.false_alarms.seconds > 0.0 else "–"
+    def alarms(s: score.Score) -> str:
+        return words.short(s.false_alarms.per_hour) if s.runs and s.false_alarms.seconds > 0.0 else "–"
 
-    def table(text: Callable[[Score], str], rows: Sequence[str]) -> Table:
-        header = ("Situation", *map(title_of, names))
+    def table(text: Callable[[score.Score], str], rows: Sequence[str]) -> Table:
+        header = ("Situation", *map(words.title_of, names))
         return Table(header, [(row, *(text(situations[row][n]) for n in names)) for row in rows])
 
     wet = [row for row, scores in situations.items() if any(s.partial.episodes for s in scores.values())]
     return [
         Section("Recall of partial aquaplaning by situation", [table(recall, wet)], where="text"),
         Section("False alarms per hour by situation", [table(alarms, list(situations))], where="text"),
-        Section("Situations that meet the targets", [Lines(coverage_sentences(records), "coverage")]),
+        Section("Situations that meet the targets", [Lines(words.coverage_sentences(records), "coverage")]),
     ]
 
 
@@ -250,27 +230,27 @@ def evaluation_document(
         },
         "thresholds": {n: plain(x) for n, x in evaluation.thresholds.items()},
         "rivals": None if evaluation.rivals is None else dict(evaluation.rivals),
-        "detectors": _scores(score_all(records)),
+        "detectors": _scores(score.score_all(records)),
         "by": [
-            {"groups": dict(zip(by, key, strict=True)), "detectors": _scores(score_all(some))}
-            for key, some in (grouped(records, by).items() if by else ())
+            {"groups": dict(zip(by, key, strict=True)), "detectors": _scores(score.score_all(some))}
+            for key, some in (score.grouped(records, by).items() if by else ())
         ],
         "confusion": {
             row: {
                 n: {"episodes": c.episodes, "with_event": c.hit, "events_per_hour": plain(_per_hour(c))}
                 for n, c in cells.items()
             }
-            for row, cells in confusion(records).items()
+            for row, cells in score.confusion(records).items()
         },
-        "situations": {row: _scores(scores) for row, scores in situation_scores(records).items()},
-        "coverage": [asdict(c) for c in coverage(situation_scores(records)).values()],
+        "situations": {row: _scores(scores) for row, scores in score.situation_scores(records).items()},
+        "coverage": [asdict(c) for c in score.coverage(score.situation_scores(records)).values()],
         "roc": [_point(p) for p in evaluation.roc],
         "better_rivals": [
             {**fields_of(b, "rival", "against"), "situation": b.situation or None,
              **fields_of(b, "measure", "rival_value", "own_value", beyond_chance="is_sure", at_a_price="at_a_price")}
-            for b in better_rivals(records)
+            for b in score.better_rivals(records)
         ],
-        "sentences": [*verdicts(records), *better_sentences(records)],
+        "sentences": [*words.verdicts(records), *words.better_sentences(records)],
         "tuning": None if tuning is None else _tuning(tuning),
         "runs": [
             {"name": r.name, "groups": dict(r.groups), "seconds": plain(r.duration_s),
@@ -278,7 +258,7 @@ def evaluation_document(
              "unavailable": list(r.unavailable)} for r in records
         ],
         "gates": [{"gate": g.gate.text, "value": plain(g.value), "kept": g.is_kept, "found": g.found} for g in gates],
-        "notes": notes_of(records),
+        "notes": words.notes_of(records),
     }  # fmt: skip
 
 
@@ -286,11 +266,11 @@ def _tuning(t: Tuning) -> dict[str, Any]:
     return {
         **fields_of(t, "rule", "limit_per_hour", "tuned_on", "reported_on", "unused", digits=None),
         "choices": [{**_point(c.point), "reason": c.reason} for c in t.choices.values()],
-        "before": _scores(score_all(t.before)),
+        "before": _scores(score.score_all(t.before)),
     }
 
 
-def _recall(r: Recall) -> dict[str, Any]:
+def _recall(r: score.Recall) -> dict[str, Any]:
     return {
         **fields_of(r, "episodes", "found", recall="share", ci95="ci95", warned_before="before_share"),
         "latency_median_s": plain(r.latency(0.5)),
@@ -298,13 +278,13 @@ def _recall(r: Recall) -> dict[str, Any]:
     }
 
 
-def _scores(scores: Mapping[str, Score]) -> dict[str, Any]:
+def _scores(scores: Mapping[str, score.Score]) -> dict[str, Any]:
     return {
         n: {
             **fields_of(s, drives="runs", unavailable="unavailable"),
             **{k: _recall(getattr(s, k)) for k in ("full", "partial", "wheel_full", "wheel_partial", "own")},
             "false_alarms": {
-                "count": s.false_alarms.count, "hours": plain(s.false_alarms.seconds / HOUR_S),
+                "count": s.false_alarms.count, "hours": plain(s.false_alarms.seconds / score.HOUR_S),
                 **fields_of(s.false_alarms, "per_hour", "per_hour_ci95", "per_100km", "per_100km_ci95"),
             },
             "on_water": fields_of(s.on_water, "count", "per_hour"),
@@ -319,5 +299,5 @@ def _point(p: RocPoint) -> dict[str, Any]:
         "full": plain(p.full.share),
         "partial": plain(p.partial.share),
         **fields_of(p.false_alarms, "per_hour", "count"),
-        "hours": plain(p.false_alarms.seconds / HOUR_S),
+        "hours": plain(p.false_alarms.seconds / score.HOUR_S),
     }

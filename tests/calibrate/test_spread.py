@@ -3,17 +3,8 @@
 import numpy as np
 import pytest
 
+from aqualog.calibrate import spread as spreads
 from aqualog.calibrate.derive import estimates
-from aqualog.calibrate.spread import (
-    WIND_SD,
-    Spread,
-    combined,
-    half_width,
-    jackknife_of,
-    one_more,
-    spread_of,
-    stratified,
-)  # fmt: skip
 from tests.calibrate.test_balance import RHO, drives
 
 
@@ -23,31 +14,35 @@ def test_combined_intervals_cover_whatever_the_drives_differ_by(times):
     rng = np.random.default_rng([int(times), 5])
     inside = []
     for _ in range(3000):
-        seen = Spread({"x": np.sqrt(times * rng.chisquare(3) / 3.0)}, {"x": 3.0}, by_drive=True)
-        both = combined(Spread({"x": 1.0}, {"x": 1e6}, by_drive=False), seen)
-        inside.append(abs(np.sqrt(times) * rng.normal()) <= half_width(both.sd["x"], both.dof["x"]))
+        seen = spreads.Spread({"x": np.sqrt(times * rng.chisquare(3) / 3.0)}, {"x": 3.0}, by_drive=True)
+        both = spreads.combined(spreads.Spread({"x": 1.0}, {"x": 1e6}, by_drive=False), seen)
+        inside.append(abs(np.sqrt(times) * rng.normal()) <= spreads.half_width(both.sd["x"], both.dof["x"]))
     assert 0.92 < np.mean(inside) < 0.98
 
 
 def test_pooled_where_they_agree_by_drives_where_not():
-    assumed = Spread({"x": 1.0}, {"x": 9.0}, by_drive=False)
-    agreeing = combined(assumed, Spread({"x": 0.8}, {"x": 3.0}, by_drive=True))
+    assumed = spreads.Spread({"x": 1.0}, {"x": 9.0}, by_drive=False)
+    agreeing = spreads.combined(assumed, spreads.Spread({"x": 0.8}, {"x": 3.0}, by_drive=True))
     assert agreeing.dof["x"] == 12.0
     assert agreeing.sd["x"] == pytest.approx(np.sqrt((9.0 + 3.0 * 0.64) / 12.0))
-    refuting = combined(assumed, Spread({"x": 3.0}, {"x": 3.0}, by_drive=True))
+    refuting = spreads.combined(assumed, spreads.Spread({"x": 3.0}, {"x": 3.0}, by_drive=True))
     assert (refuting.sd["x"], refuting.dof["x"]) == (3.0, 3.0)
-    unknown = combined(Spread({"x": np.nan}, {"x": 9.0}, by_drive=False), Spread({"x": np.nan}, {"x": 3.0}, True))
-    assert np.isnan(half_width(unknown.sd["x"], unknown.dof["x"]))
+    unknown = spreads.combined(
+        spreads.Spread({"x": np.nan}, {"x": 9.0}, by_drive=False), spreads.Spread({"x": np.nan}, {"x": 3.0}, True)
+    )
+    assert np.isnan(spreads.half_width(unknown.sd["x"], unknown.dof["x"]))
 
 
 def test_what_sets_a_drive_apart_is_not_within_it():
     plain = [{"x": v} for v in (0.0, 1.0, 2.0, 1.0)]
     moved = [{"x": v + 50.0} for v in (0.0, 1.0, 2.0, 1.0)]
-    assert stratified([plain, moved]).sd["x"] == pytest.approx(np.sqrt(2.0) * stratified([plain]).sd["x"])
-    assert stratified([plain, moved]).dof["x"] == 6.0
+    assert spreads.stratified([plain, moved]).sd["x"] == pytest.approx(
+        np.sqrt(2.0) * spreads.stratified([plain]).sd["x"]
+    )
+    assert spreads.stratified([plain, moved]).dof["x"] == 6.0
     # drives of one block each are one stratum; a lone one joins another
-    assert stratified([[e] for e in plain]).sd["x"] == pytest.approx(stratified([plain]).sd["x"])
-    assert stratified([plain[:3], plain[3:]]).dof["x"] == 3.0
+    assert spreads.stratified([[e] for e in plain]).sd["x"] == pytest.approx(spreads.stratified([plain]).sd["x"])
+    assert spreads.stratified([plain[:3], plain[3:]]).dof["x"] == 3.0
 
 
 def test_winds_of_drives_count_once():
@@ -55,10 +50,10 @@ def test_winds_of_drives_count_once():
     within, between = [], []
     for seed in range(20):
         samples = drives(seed, 4, noise=0.002)
-        within.append(jackknife_of(lambda s: estimates(s, {}), samples).sd["drag_area"])
-        spread = spread_of(lambda s: estimates(s, {}), samples, drag=4.7e-4, air_density=RHO)
+        within.append(spreads.jackknife_of(lambda s: estimates(s, {}), samples).sd["drag_area"])
+        spread = spreads.spread_of(lambda s: estimates(s, {}), samples, drag=4.7e-4, air_density=RHO)
         between.append(spread.sd["drag_area"])
-    one = 0.7 * WIND_SD / 22.0  # [m^2] a wind w adds 2 v w to v^2: w / v of the drag area
+    one = 0.7 * spreads.WIND_SD / 22.0  # [m^2] a wind w adds 2 v w to v^2: w / v of the drag area
     assert np.median(between) == pytest.approx(one / np.sqrt(4.0), rel=0.25)
     assert np.median(within) < 0.25 * np.median(between)
 
@@ -69,7 +64,7 @@ def test_one_drive_more_lies_within_its_spread():
     inside = []
     for _ in range(2000):
         x = rng.normal(size=6)
-        seen = Spread({"x": float(np.std(x[:5], ddof=1)) / np.sqrt(5.0)}, {"x": 4.0}, by_drive=True)
-        inside.append(abs(x[5] - x[:5].mean()) <= 1.96 * one_more(seen, 5)["x"])
+        seen = spreads.Spread({"x": float(np.std(x[:5], ddof=1)) / np.sqrt(5.0)}, {"x": 4.0}, by_drive=True)
+        inside.append(abs(x[5] - x[:5].mean()) <= 1.96 * spreads.one_more(seen, 5)["x"])
     assert 0.93 < np.mean(inside) < 0.97
-    assert one_more(Spread({"x": 1.0}, {"x": 9.0}, by_drive=False), 2) == {}
+    assert spreads.one_more(spreads.Spread({"x": 1.0}, {"x": 9.0}, by_drive=False), 2) == {}

@@ -12,20 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aqualog.campaign import plan as forecast
 from aqualog.campaign.batch import run_batch
 from aqualog.campaign.definition import Campaign, Run, Shard, part_of
 from aqualog.campaign.jobs import Job
-from aqualog.campaign.plan import (
-    BatchCost,
-    LogCost,
-    Work,
-    choose,
-    foretell,
-    makespan,
-    measure_cost,
-    shards_within,
-    work_of,
-)
 from aqualog.campaign.store import Store
 from aqualog.config.configured import configure
 from aqualog.core.compiled import kept_code
@@ -48,21 +38,21 @@ def jobs(count, form="csv", *, step=1_000_000, name="log"):
 
 
 def sampled(chosen, cost, *, store=1000):
-    return tuple(LogCost(j.logs, f, s, 2.0 * cost(f, s), cost(f, s), store, "") for j, f, s in chosen)
+    return tuple(forecast.LogCost(j.logs, f, s, 2.0 * cost(f, s), cost(f, s), store, "") for j, f, s in chosen)
 
 
 def trial(found, **more):
     given = {"hashing_s": 0.0, "tables_s": 0.0, "start_s": 3.0, "start_cpu_s": 1.0, "ending_s": 0.5, "peak_bytes": 1}
-    return BatchCost(found, 2, **(given | more))
+    return forecast.BatchCost(found, 2, **(given | more))
 
 
 def told(work, found, **more):
-    return foretell(work, found, **({"processes": 2, "cores": 2, "lead_s": 1.0, "lead_cpu_s": 0.5} | more))
+    return forecast.foretell(work, found, **({"processes": 2, "cores": 2, "lead_s": 1.0, "lead_cpu_s": 0.5} | more))
 
 
 def test_a_sample_has_every_format_and_both_ends_of_the_sizes():
     new = [*jobs(50), *jobs(5, "mdf", step=1000), *jobs(1, "mcap"), *jobs(3, "unknown")]
-    chosen = choose(new, 8)
+    chosen = forecast.choose(new, 8)
     sizes = {f: sorted(s for _, g, s in chosen if g == f) for f in ("csv", "mdf", "mcap", "unknown")}
     assert sizes["csv"][0] == 1_000_000
     assert sizes["csv"][-1] == 50_000_000
@@ -70,25 +60,25 @@ def test_a_sample_has_every_format_and_both_ends_of_the_sizes():
     assert sizes["mdf"] == [5000]
     assert len(sizes["mcap"]) == 1
     assert sizes["unknown"] == []
-    assert sorted(s for _, _, s in choose(jobs(3), 8)) == [1_000_000, 2_000_000, 3_000_000]
-    assert choose(jobs(3, "unknown"), 8) == []
+    assert sorted(s for _, _, s in forecast.choose(jobs(3), 8)) == [1_000_000, 2_000_000, 3_000_000]
+    assert forecast.choose(jobs(3, "unknown"), 8) == []
 
 
 def test_costs_on_a_line_are_foretold_exactly():
     costs = {"csv": lambda s: 0.5 + 1e-6 * s, "mdf": lambda s: 0.1 + 3e-8 * s}
     new = [*jobs(40), *jobs(30, "mdf")]
     of = lambda f, s: costs[f](s)  # noqa: E731
-    work = Work(tuple(new), 0, 0, ())
-    plan = told(work, trial(sampled(choose(new, 12), of), hashing_s=0.0))
+    work = forecast.Work(tuple(new), 0, 0, ())
+    plan = told(work, trial(sampled(forecast.choose(new, 12), of), hashing_s=0.0))
     truth = sum(of(f, s) for _, f, s in new)
     assert plan.stretch == pytest.approx(2.0)
     assert plan.logs_s.value == pytest.approx(2.0 * truth)
     assert plan.logs_s.high == pytest.approx(plan.logs_s.low, rel=1e-6)
-    assert plan.wall_s.value == pytest.approx(makespan(plan.seconds, 2) + 1.0 + 3.0 + 0.5)
+    assert plan.wall_s.value == pytest.approx(forecast.makespan(plan.seconds, 2) + 1.0 + 3.0 + 0.5)
     assert plan.cpu_s.value == pytest.approx(truth + 0.5 + 2 * 1.0)
     assert plan.store_bytes.value == pytest.approx(1000 * 70)
     # more processes than cores get ready one after another, and work no faster
-    many = told(work, trial(sampled(choose(new, 12), of)), processes=8)
+    many = told(work, trial(sampled(forecast.choose(new, 12), of)), processes=8)
     assert many.wall_s.value == pytest.approx(plan.wall_s.value + 3.0 * 3.0)
 
 
@@ -99,7 +89,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     for _ in range(inside):
         noise = dict(zip((s for _, _, s in new), np.exp(0.3 * rng.standard_normal(100)), strict=True))
         cost = lambda f, s, noise=noise: (0.2 + 1e-7 * s) * noise[s]  # noqa: E731
-        plan = told(Work(tuple(new), 0, 0, ()), trial(sampled(choose(new, 10), cost)), lead_cpu_s=0.0)
+        plan = told(forecast.Work(tuple(new), 0, 0, ()), trial(sampled(forecast.choose(new, 10), cost)), lead_cpu_s=0.0)
         truth = sum(cost(f, s) for _, f, s in new) + 2.0
         held += plan.cpu_s.low <= truth <= plan.cpu_s.high
     assert 0.84 <= held / inside <= 0.98
@@ -107,9 +97,9 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 
 def test_a_log_that_took_its_process_down_and_formats_unseen_are_told():
     new = [*jobs(10), *jobs(2, "mdf"), *jobs(2, "unknown")]
-    found = list(sampled(choose(jobs(10), 4), lambda f, s: 1.0))
+    found = list(sampled(forecast.choose(jobs(10), 4), lambda f, s: 1.0))
     found[0] = replace(found[0], reason="is damaged")
-    plan = told(Work(tuple(new), 0, 0, ()), trial(tuple(found)))
+    plan = told(forecast.Work(tuple(new), 0, 0, ()), trial(tuple(found)))
     text = " ".join(plan.notes)
     assert "1 of 4 logs of the sample" in text
     assert "no log of format mdf" in text
@@ -118,8 +108,8 @@ def test_a_log_that_took_its_process_down_and_formats_unseen_are_told():
 
 
 def test_makespan():
-    assert makespan(np.array([3.0, 1.0, 1.0, 1.0]), 2) == 3.0
-    assert makespan(np.array([1.0, 1.0, 4.0]), 2) == 5.0
+    assert forecast.makespan(np.array([3.0, 1.0, 1.0, 1.0]), 2) == 3.0
+    assert forecast.makespan(np.array([1.0, 1.0, 4.0]), 2) == 5.0
 
 
 def test_shards_are_those_that_the_batch_makes(campaign):
@@ -127,14 +117,14 @@ def test_shards_are_those_that_the_batch_makes(campaign):
     runs = tuple(Run((Path(f"/d/log{i}.csv"),), Path("car.toml"), None, None, {}) for i in range(200))
     configured = replace(configured, campaign=Campaign("many", Path("/d/c.toml"), None, runs, None))
     new = jobs(200, step=0)
-    plan = told(Work(tuple(new), 0, 0, ()), trial(sampled(choose(new, 8), lambda f, s: 1.0)))
-    count, longest = shards_within(configured, Work(tuple(new), 0, 0, ()), plan, 60.0)
+    plan = told(forecast.Work(tuple(new), 0, 0, ()), trial(sampled(forecast.choose(new, 8), lambda f, s: 1.0)))
+    count, longest = forecast.shards_within(configured, forecast.Work(tuple(new), 0, 0, ()), plan, 60.0)
     fixed = 1.0 + 3.5
     parts = [len(part_of(configured.campaign, Shard(i + 1, count)).runs) for i in range(count)]
     assert fixed + 2.0 * max(parts) / 2 <= longest <= 60.0
     fewer = [len(part_of(configured.campaign, Shard(i + 1, count - 1)).runs) for i in range(count - 1)]
     assert fixed + 2.0 * max(fewer) / 2 + 1.0 > 60.0
-    assert shards_within(configured, Work(tuple(new), 0, 0, ()), plan, 6.0) is None
+    assert forecast.shards_within(configured, forecast.Work(tuple(new), 0, 0, ()), plan, 6.0) is None
 
 
 def test_what_is_in_the_store_is_not_counted_and_nothing_is_hashed(tmp_path, monkeypatch):
@@ -144,7 +134,7 @@ def test_what_is_in_the_store_is_not_counted_and_nothing_is_hashed(tmp_path, mon
     run_batch(replace(configured, campaign=replace(configured.campaign, runs=runs[:1])), store)
     (tmp_path / "runs.csv").open("a").write("logs/none.mf4,a,,,,,\n")
     monkeypatch.setattr(Contents, "_unknown", lambda *_: pytest.fail("a log is hashed"))
-    work = work_of(configure(path), store)
+    work = forecast.work_of(configure(path), store)
     assert [j.logs for j, _, _ in work.new] == [runs[1].logs]
     assert (work.kept, work.failed, len(work.missing)) == (1, 0, 1)
 
@@ -204,7 +194,7 @@ def test_a_sample_in_which_was_compiled_is_measured_again(kept, times, monkeypat
     states, measured, heard = iter(kept), [], []
     monkeypatch.setattr("aqualog.campaign.plan.kept_code", lambda: frozenset(next(states)))
     monkeypatch.setattr("aqualog.campaign.plan._measured_once", lambda *given: measured.append(given) or len(measured))
-    assert measure_cost(None, [], processes=2, told=lambda: heard.append(len(measured))) == times
+    assert forecast.measure_cost(None, [], processes=2, told=lambda: heard.append(len(measured))) == times
     assert heard == [1] * (times - 1)
 
 

@@ -15,18 +15,6 @@ from aqualog.evaluate.score import score
 from aqualog.evaluate.sweep import JOINT
 from aqualog.model.drawing import TUNING_POOL
 from aqualog.thesis.checks import joint
-from aqualog.thesis.checks.joint import (
-    MEASURED,
-    MORE_ALARMS,
-    SINGLE,
-    VARIANTS,
-    Row,
-    compared,
-    drawn_items,
-    rows_of,
-    variants_of,
-    with_velocity,
-)
 from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED
 
 FIRST_SEED = 150
@@ -35,12 +23,12 @@ WITHOUT = ("none (estimated from wheels and accelerometer)", "mean of the four w
 
 @pytest.fixture(scope="module")
 def records():
-    return [variants_of(item) for item in drawn_items(20, FIRST_SEED, TUNING_POOL)]
+    return [joint.variants_of(item) for item in joint.drawn_items(20, FIRST_SEED, TUNING_POOL)]
 
 
 @pytest.fixture(scope="module")
 def table(records):
-    return rows_of(records)
+    return joint.rows_of(records)
 
 
 ONE_MISSED = pytest.mark.xfail(strict=True, reason="on the mended water one partial pass of 16 is missed: C70 differs")
@@ -52,14 +40,14 @@ def test_c70_in_part(table):
     """A coarse measurement changes nothing. Without one, wheels in antilock braking are the only reference there is."""
     like = {key: row.is_like(table[key[0], "as measured"]) for key, row in table.items()}
     assert {d for (d, v), holds in like.items() if not holds} == {"spin_down", "spin_up"}
-    assert all(holds for (_, v), holds in like.items() if v in MEASURED)
+    assert all(holds for (_, v), holds in like.items() if v in joint.MEASURED)
 
 
 @ONE_MISSED
 @pytest.mark.nightly
 def test_c70_the_joint_detector_needs_no_velocity(table):
     rows = [row for (d, _), row in table.items() if d == "joint_criteria"]
-    assert len(rows) == len(VARIANTS)
+    assert len(rows) == len(joint.VARIANTS)
     for row in rows:
         assert row.full[0] == row.full[1] >= 15
         assert row.partial[0] == row.partial[1] >= 15
@@ -74,24 +62,24 @@ def test_c70_the_alarms_on_top_are_those_of_antilock_braking(records):
                 score([r[v] for r in records if not r[v].name.startswith("abs_")], detector).false_alarms.count
                 for v in ("as measured", variant)
             )
-            assert after - before <= MORE_ALARMS, (variant, detector)
+            assert after - before <= joint.MORE_ALARMS, (variant, detector)
 
 
 def test_velocities_are_what_they_say():
-    d = joint._drive(drawn_items(1, FIRST_SEED, TUNING_POOL)[0])
+    d = joint._drive(joint.drawn_items(1, FIRST_SEED, TUNING_POOL)[0])
     v = d.signals.array("v_x")
-    fast = with_velocity(d, VARIANTS["2 % too fast"]).signals.array("v_x")
+    fast = joint.with_velocity(d, joint.VARIANTS["2 % too fast"]).signals.array("v_x")
     np.testing.assert_allclose(fast, 1.02 * v)
-    after = with_velocity(d, VARIANTS["0.2 s late"]).signals.array("v_x")
+    after = joint.with_velocity(d, joint.VARIANTS["0.2 s late"]).signals.array("v_x")
     n = round(0.2 / d.signals.dt)
     np.testing.assert_array_equal(after[n:], v[:-n])
-    assert "v_x" not in with_velocity(d, VARIANTS[WITHOUT[0]]).signals.frame.columns
-    wheels = with_velocity(d, VARIANTS[WITHOUT[1]]).signals.array("v_x")
+    assert "v_x" not in joint.with_velocity(d, joint.VARIANTS[WITHOUT[0]]).signals.frame.columns
+    wheels = joint.with_velocity(d, joint.VARIANTS[WITHOUT[1]]).signals.array("v_x")
     assert np.nanmedian(wheels) == pytest.approx(np.nanmedian(v), rel=0.02)
 
 
 def test_a_detector_that_goes_blind_or_cries_wolf_is_not_like_before():
-    base = Row("x", "as measured", (10, 20), (10, 20), 1)
+    base = joint.Row("x", "as measured", (10, 20), (10, 20), 1)
     assert replace(base, full=(11, 20), false_alarms=3).is_like(base)
     assert replace(base, false_alarms=0).is_like(base)
     assert not replace(base, full=(7, 20)).is_like(base)
@@ -107,14 +95,14 @@ def run(found, alarms):
 
 def c78(**detectors):
     """C78 over one wet and one dry situation; detector=(found of 10, false alarms)."""
-    runs = {d: run(*detectors.get(d, (6, 1))) for d in (*SINGLE, *JOINT)}
+    runs = {d: run(*detectors.get(d, (6, 1))) for d in (*joint.SINGLE, *JOINT)}
     wet = {d: DetectorRun(partial=hits) for d, (hits, _) in runs.items()}
     dry = {d: DetectorRun(false_alarms=alarms) for d, (_, alarms) in runs.items()}
     records = [
         RunRecord("a", {"manoeuvre": "lane"}, 100.0, 0.0, 0.0, 10.0, wet),
         RunRecord("b", {"manoeuvre": "dry"}, 100.0, 100.0, 2e3, 0.0, dry),
     ]
-    return {c.part: c for c in compared(records, "test")}
+    return {c.part: c for c in joint.compared(records, "test")}
 
 
 def test_c78_is_reproduced_if_the_joint_detectors_are_better_in_all():

@@ -15,20 +15,8 @@ from aqualog.thesis.checks.spins import aic_gain, rank_correlation
 from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED, combined
 from aqualog.thesis.evidence import scenes, seeds
 from aqualog.thesis.evidence.passes import SPIN_EDGES, Pass, PassFigures, drive_pass, events, figures_of, initial_slope
-from aqualog.thesis.evidence.seeds import (
-    PASS_SEEDS,
-    Cell,
-    Plan,
-    estimate,
-    first_speed,
-    mean,
-    scatter,
-    spread_over,
-    table_of,
-    told,
-)
 
-PASSES = [m for module in (spins, resistance, slip_slope, joint) for m in module.CHECKS if m.seeds == PASS_SEEDS]
+PASSES = [m for module in (spins, resistance, slip_slope, joint) for m in module.CHECKS if m.seeds == seeds.PASS_SEEDS]
 MAKERS = {m.claims[0]: m.checks for m in PASSES}
 SEEDS = (1, 2, 3, 4)
 
@@ -92,17 +80,17 @@ def test_a_table_is_made_once_and_dry_passes_with_two_seeds(monkeypatch):
     made = []
     monkeypatch.setattr(seeds, "figures_of", lambda p, s: made.append((p, s)) or template())
     wet, dry = Pass(90), Pass(90, h=0.0)
-    table = table_of([wet, dry, wet], Plan(SEEDS))
+    table = seeds.table_of([wet, dry, wet], seeds.Plan(SEEDS))
     assert len(table[wet].figures) == 4
     assert len(table[dry].figures) == 2
-    table_of([wet], Plan(SEEDS))
+    seeds.table_of([wet], seeds.Plan(SEEDS))
     assert len(made) == 6
 
 
 def test_processes_give_what_one_gives():
     items = [(Pass(70.0 + k), 1) for k in range(41)]
     said = []
-    one, two = (spread_over(seeds._one, items, Plan((1,), jobs, said.append), "passes") for jobs in (1, 2))
+    one, two = (seeds.spread_over(seeds._one, items, seeds.Plan((1,), jobs, said.append), "passes") for jobs in (1, 2))
     assert [f.delta_a for f in one] == [f.delta_a for f in two]
     assert len({f.delta_a for f in one}) == 41
     assert said[-1] == "41 of 41 passes"
@@ -116,37 +104,37 @@ def crash(item):
 
 def test_a_process_that_ends_without_a_word_is_an_error():
     with pytest.raises(ConfigError, match="without a message"):
-        spread_over(crash, range(41), Plan((1,), 2), "passes")
+        seeds.spread_over(crash, range(41), seeds.Plan((1,), 2), "passes")
 
 
 def test_the_interval_of_a_mean_holds_what_theory_says():
     x = np.random.default_rng(3).normal(5.0, 2.0, 200)
-    value, (low, high) = estimate(lambda r: float(x[r].mean()), 200)
+    value, (low, high) = seeds.estimate(lambda r: float(x[r].mean()), 200)
     assert value == x.mean()
     assert high - low == pytest.approx(2 * 1.96 * x.std() / np.sqrt(200), rel=0.15)
-    assert estimate(lambda r: float("inf"), 5) == (float("inf"), (float("inf"), float("inf")))
-    only = estimate(lambda r: float("nan") if 0 not in r else 2.0, 3)
+    assert seeds.estimate(lambda r: float("inf"), 5) == (float("inf"), (float("inf"), float("inf")))
+    only = seeds.estimate(lambda r: float("nan") if 0 not in r else 2.0, 3)
     assert only == (2.0, (2.0, 2.0))
 
 
 def test_first_speed_is_linear_between_speeds():
     met = np.array([[0, 0, 0, 0], [1, 0, 0, 0], [1, 1, 1, 0]], dtype=bool)
-    at = first_speed((80, 90, 100), met)
+    at = seeds.first_speed((80, 90, 100), met)
     assert at(np.arange(4)) == pytest.approx(95.0)
     assert at(np.array([0])) == 85.0
     assert at(np.array([3])) == float("inf")
-    assert first_speed((80, 90, 100), ~met)(np.arange(4)) == 80.0
+    assert seeds.first_speed((80, 90, 100), ~met)(np.arange(4)) == 80.0
 
 
 def test_cells_and_words():
-    cell = Cell((template(depth=1.0), template(depth=np.nan), template(depth=3.0)))
-    assert mean(cell.of("depth")) == 2.0
-    assert scatter(cell.of("depth")) == pytest.approx(np.sqrt(2.0))
-    assert np.isnan(mean(np.array([np.nan])))
-    assert np.isnan(scatter(np.array([1.0])))
-    assert told(91.34, (90.0, 92.0)) == "91.3 (90.0 to 92.0)"
-    assert told(np.inf, (1.0, np.inf)) == "never"
-    assert told(2.0, (1.0, np.inf)) == "2.0 (1.0 to never)"
+    cell = seeds.Cell((template(depth=1.0), template(depth=np.nan), template(depth=3.0)))
+    assert seeds.mean(cell.of("depth")) == 2.0
+    assert seeds.scatter(cell.of("depth")) == pytest.approx(np.sqrt(2.0))
+    assert np.isnan(seeds.mean(np.array([np.nan])))
+    assert np.isnan(seeds.scatter(np.array([1.0])))
+    assert seeds.told(91.34, (90.0, 92.0)) == "91.3 (90.0 to 92.0)"
+    assert seeds.told(np.inf, (1.0, np.inf)) == "never"
+    assert seeds.told(2.0, (1.0, np.inf)) == "2.0 (1.0 to never)"
 
 
 def test_an_exponential_is_told_from_a_line():
@@ -186,7 +174,7 @@ def verdict(monkeypatch):
     def of(claim, figures):
         monkeypatch.setattr(seeds, "_MADE", {})
         monkeypatch.setattr(seeds, "figures_of", lambda p, seed: template(**figures(p, seed)))
-        checks = MAKERS[claim](Plan(SEEDS))
+        checks = MAKERS[claim](seeds.Plan(SEEDS))
         return combined(c.verdict for c in checks)
 
     return of
@@ -373,7 +361,7 @@ def test_c49(verdict, low, expected):
 def test_c47(monkeypatch):
     def of(found):
         monkeypatch.setattr(slip_slope, "_found", found)
-        return combined(c.verdict for c in slip_slope.detected(Plan(SEEDS)))
+        return combined(c.verdict for c in slip_slope.detected(seeds.Plan(SEEDS)))
 
     assert of(lambda item: Found(1.0, 0.1, 0.2, is_early=False)) == REPRODUCED
     assert of(lambda item: Found(1.0 if item[1] % 2 else np.nan, 0.1, 0.2, is_early=False)) == DIFFERENCE
@@ -394,6 +382,6 @@ def test_c47_on_one_drive():
 def test_shares_come_with_their_interval(verdict, monkeypatch):
     monkeypatch.setattr(seeds, "_MADE", {})
     monkeypatch.setattr(seeds, "figures_of", lambda p, seed: template(dips=int(seed == 1)))
-    (check,) = MAKERS["C14"](Plan(SEEDS))
+    (check,) = MAKERS["C14"](seeds.Plan(SEEDS))
     assert check.value == 0.25
     assert check.ci95 == wilson(1, 4)
