@@ -10,7 +10,7 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.physics.load import G
-from aqualog.trade.lane import Span, mean_over, spans_of
+from aqualog.trade.lane import Span, depth_of, mean_over, spans_of
 from aqualog.trade.limits import BrakingLimits, defaults
 from aqualog.trade.run_checks import longest_gap
 
@@ -154,7 +154,7 @@ def _stop(
     distance = float(np.sum(0.5 * (speed[1:] + speed[:-1]) * np.diff(at)))
     bfc = bfc_of(v_from, v_to, distance)
     temperature = _temperature(signals, (t >= start) & (t <= end), conditions)
-    depth, dry = _water(signals, (t >= start) & (t <= end), (start, end), conditions, lane)
+    depth, dry = _water(signals, (start, end), conditions, lane)
     at_reference = bfc + limits.temperature * (temperature - limits.temperature_reference)
     stop = Stop(
         v_from, v_to, distance, bfc, at_reference, temperature, depth, conditions.texture, start, end,
@@ -212,13 +212,13 @@ def _temperature(signals: Signals, inside: BoolArray, conditions: Conditions) ->
     return float(np.nanmean(seen)) - _ZERO_CELSIUS if np.isfinite(seen).any() else math.nan
 
 
-def _water(
-    signals: Signals, inside: BoolArray, span: Span, conditions: Conditions, lane: Span | None
-) -> tuple[float, str]:
-    """Return the water depth [m], NaN if not known, and why the stop is not one on water; empty if it is."""
-    seen = [signals.array(n)[inside] for n in ("water_depth", "water_depth_left", "water_depth_right")]
-    known = [float(np.nanmedian(x)) for x in seen if np.isfinite(x).any()]
-    depth = conditions.water_depth if math.isfinite(conditions.water_depth) else max(known, default=math.nan)
+def _water(signals: Signals, span: Span, conditions: Conditions, lane: Span | None) -> tuple[float, str]:
+    """Return the water depth [m], NaN if not known, and why the stop is not one on water; empty if it is.
+
+    The depth is the log's, which was measured in this stop, else the campaign's.
+    """
+    seen = depth_of(signals, span)
+    depth = seen if math.isfinite(seen) else conditions.water_depth
     spans = spans_of(signals, lane)
     if spans:
         is_within = any(a - _EDGE_S <= span[0] and span[1] <= b + _EDGE_S for a, b in spans)

@@ -154,9 +154,8 @@ def evaluated(entries: Sequence[Entry], options: Options, failed: Mapping[str, s
     for i, e in enumerate(entries):
         groups.setdefault(e.group, []).append(i)
     judged = list(entries)
-    if options.kind == "straight":
-        for members in groups.values():
-            _judge_acceleration(judged, members, options)
+    for members in groups.values():
+        _judge_by_set(judged, members, options.limits)
     test = TradeTest(options, tuple(judged), (), failed=dict(failed or {}))
     if options.kind == "curve":
         return _of_curves(test, groups)
@@ -171,18 +170,25 @@ def _is_control(entries: Sequence[Entry], members: Sequence[int], options: Optio
     return bool(options.control) and all(entries[i].tyre == options.control for i in members)
 
 
-def _judge_acceleration(entries: list[Entry], members: Sequence[int], options: Options) -> None:
-    """Note in place which runs of a set have an acceleration of their own."""
-    share = options.limits.straight.a_x_share
-    a_x = [f.a_x if isinstance(f := entries[i].found, StraightRun) and f.valid else math.nan for i in members]
-    median = float(np.nanmedian(a_x)) if np.isfinite(a_x).any() else math.nan
-    for i, value, is_away in zip(members, a_x, away_from_set(a_x, share), strict=True):
+def _judge_by_set(entries: list[Entry], members: Sequence[int], limits: Limits) -> None:
+    """Note in place which runs of a set have an acceleration, and which stops a coefficient, of their own."""
+    values = [_compared(e.found) if (e := entries[i]).found.valid else math.nan for i in members]
+    is_braking = isinstance(entries[members[0]].found, Stop)
+    share = limits.braking.bfc_share if is_braking else limits.straight.a_x_share
+    told, unit = ("the coefficient", "") if is_braking else ("the acceleration before 15 %", " m/s²")
+    why = ": did ABS control the brake?" if is_braking else ""
+    for i, value, is_away in zip(members, values, away_from_set(values, share), strict=True):
         if is_away:
+            median = float(np.nanmedian(values))
             reason = (
-                f"the acceleration before 15 % is {value:.2f} m/s², more than {100 * share:g} % from the set's median "
-                f"of {median:.2f}"
+                f"{told} is {value:.2f}{unit}, more than {100 * share:g} % from the set's median of {median:.2f}{why}"
             )
             entries[i] = replace(entries[i], of_set=(reason,))
+
+
+def _compared(found: Record) -> float:
+    """Return what a run has in common with the others of its set; NaN for a pass."""
+    return found.a_x if isinstance(found, StraightRun) else found.bfc if isinstance(found, Stop) else math.nan
 
 
 def _summary(entries: Sequence[Entry], options: Options) -> Summary:

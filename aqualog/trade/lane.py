@@ -9,13 +9,14 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray, Signals
 
-__all__ = ["NO_LANE", "Side", "Span", "mean_over", "spans_of", "tracks_of", "wet_side_of"]
+__all__ = ["NO_LANE", "Side", "Span", "depth_of", "mean_over", "spans_of", "tracks_of", "wet_side_of"]
 
 Span = tuple[float, float]
 """Begin and end of a stretch from the log's first sample. [s]"""
 Side = Literal["left", "right"]
 
 NO_LANE = "no watered lane in the log: no on_water, no water depth, and no lane_start_s and lane_end_s in the campaign"
+DEPTHS = ("water_depth", "water_depth_left", "water_depth_right")
 JOINED_S = 0.5  # [s] a shorter gap in the label is a flicker of the gate, not the lane's end
 LEAST_S = 0.2  # [s] a shorter stretch is no lane
 SHARE = 0.1  # of the deeper track's water; with less the other track is dry
@@ -32,8 +33,7 @@ def spans_of(signals: Signals, given: Span | None = None) -> tuple[Span, ...]:
     t = signals.array("t")
     wet: BoolArray = signals.array("on_water") > 0.5
     if not wet.any():
-        depths = [signals.array(n) for n in ("water_depth", "water_depth_left", "water_depth_right")]
-        wet = np.any([d > WET for d in depths], axis=0)
+        wet = np.any([signals.array(n) > WET for n in DEPTHS], axis=0)
     if not wet.any():
         return ()
     edges = np.diff(np.concatenate([[0], wet.astype(np.int8), [0]]))
@@ -57,6 +57,14 @@ def tracks_of(signals: Signals, span: Span, depths: tuple[float, float] | None =
     if not all(np.isfinite(c).any() for c in columns):
         return None
     return float(np.nanmedian(columns[0])), float(np.nanmedian(columns[1]))
+
+
+def depth_of(signals: Signals, span: Span) -> float:
+    """Return the deepest water that the log has over a stretch, median over time. [m] NaN where it has none."""
+    t = signals.array("t")
+    inside = (t >= span[0]) & (t <= span[1])
+    seen = [signals.array(n)[inside] for n in DEPTHS]
+    return max((float(np.nanmedian(x)) for x in seen if np.isfinite(x).any()), default=math.nan)
 
 
 def wet_side_of(left: float, right: float) -> Side | None:

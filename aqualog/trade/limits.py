@@ -72,6 +72,7 @@ class BrakingLimits:
     dip_lasts: float
     yaw_rate: float
     lost: float
+    bfc_share: float
     depth_low: float
     depth_high: float
     temperature: float
@@ -88,6 +89,7 @@ class SetLimits:
 
     cv: float
     runs: float
+    depth_share: float
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,16 +19,17 @@ from aqualog.core.errors import AqualogError
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.guard.worker import Crashed, work_on
-from aqualog.trade.braking import Conditions, stops
+from aqualog.trade.braking import Conditions, Stop, stops
 from aqualog.trade.curve import curve_passes
 from aqualog.trade.entry import Kind, Record
-from aqualog.trade.lane import Span
+from aqualog.trade.lane import Span, depth_of
 from aqualog.trade.limits import Limits
 from aqualog.trade.onset import Onset, onset_of
 from aqualog.trade.straight import straight_runs
 
 __all__ = ["Measured", "Request", "measure_log", "measure_logs", "measure_signals", "names_of_runs"]
 
+_DEPTHS = ("water_depth_left_mm", "water_depth_mm")
 _HERE = 4  # for so few logs no processes are started
 
 Report = Callable[[int, int, int], None]
@@ -73,7 +75,21 @@ def measure_signals(signals: Signals, vehicle: Vehicle, run: Run | None, request
             signals, request.limits.braking, v_from=request.v_from, v_to=request.v_to, conditions=_conditions(run),
             lane=lane,
         )  # fmt: skip
+    if run is not None:
+        found = tuple(_of_planned_depth(signals, r, run, request.limits.set.depth_share) for r in found)
     return Measured(found, onset, signals.start_ns, signals.quality.notes)
+
+
+def _of_planned_depth(signals: Signals, record: Record, run: Run, share: float) -> Record:
+    """Return a run or pass; it does not count where the log has another depth of water than the campaign."""
+    told = [x for k in _DEPTHS if math.isfinite(x := _number(run.values, k))]
+    if isinstance(record, Stop) or record.lane is None or not told:
+        return record
+    seen, planned = 1e3 * depth_of(signals, record.lane), max(told)
+    if not abs(seen - planned) > share * planned:
+        return record
+    what = f"{seen:.1f} mm of water in the log, {planned:.1f} mm in the campaign"
+    return replace(record, reasons=(*record.reasons, what))
 
 
 def measure_logs(
@@ -134,10 +150,9 @@ def _number(values: Mapping[str, float | str], key: str) -> float:
 
 def _depths(run: Run | None) -> tuple[float, float] | None:
     """Return the water in the left and right track [m] where the campaign gives both."""
-    keys = ("water_depth_left_mm", "water_depth_mm")
-    if run is None or not all(k in run.values for k in keys):
+    if run is None or not all(k in run.values for k in _DEPTHS):
         return None
-    left, right = (1e-3 * _number(run.values, k) for k in keys)
+    left, right = (1e-3 * _number(run.values, k) for k in _DEPTHS)
     return left, right
 
 

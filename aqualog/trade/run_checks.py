@@ -57,13 +57,11 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
     if run.is_crossing and not np.isfinite(run.v[int(run.stop) : int(run.stop) + 2]).all():
         reasons.append("the speed is missing at the crossing")
     begin = max(t_stop - limits.a_x_window, run.span[0] - limits.dry)
-    a_x, source = _acceleration(signals, run.v, (t > begin) & (t <= t_stop))
+    a_x = _acceleration(t, run.v, (t > begin) & (t <= t_stop))
     if math.isnan(a_x):
         reasons.append(f"the acceleration {where} is not known")
     elif a_x < limits.a_x_least:
         reasons.append(f"the acceleration {where} is {a_x:.2f} m/s²: no full throttle")
-    if source:
-        notes.append(source)
     yaw = mean_over(signals.array("yaw_rate"), _MEAN_S, dt)[until]
     largest = float(np.nanmax(np.abs(yaw))) if np.isfinite(yaw).any() else math.nan
     if largest > limits.yaw_rate:
@@ -106,17 +104,13 @@ def torque_fall(torque: FloatArray, within: BoolArray, samples: int) -> float:
     return float(np.max(1.0 - x[highest > 0.0] / highest[highest > 0.0]))
 
 
-def _acceleration(signals: Signals, v: FloatArray, inside: BoolArray) -> tuple[float, str]:
-    """Return the mean acceleration of a stretch [m/s²], and a note where it is that of the speed."""
-    t = signals.array("t")
-    a_x = signals.array("a_x")[inside]
-    if a_x.size and np.isfinite(a_x).mean() >= 0.5:
-        return float(np.nanmean(a_x)), ""
+def _acceleration(t: FloatArray, v: FloatArray, inside: BoolArray) -> float:
+    """Return the slope of the speed over a stretch. [m/s²] An accelerometer's offset and the grade are not in it."""
     good = inside & np.isfinite(v)
     if good.sum() < 3:
-        return math.nan, ""
+        return math.nan
     away = t[good] - t[good].mean()
-    return float(away @ v[good] / (away @ away)), "no a_x: the acceleration is that of the speed"
+    return float(away @ v[good] / (away @ away))
 
 
 def _shift(signals: Signals, t: FloatArray, t_stop: float, seconds: float) -> bool | None:

@@ -9,23 +9,34 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
+from aqualog.features.smoothing import earlier
+from aqualog.trade.lane import mean_over
 
-__all__ = ["Speeds", "references"]
+__all__ = ["Speeds", "lateness", "references"]
 
 _SHARE = 0.9  # of the lane on which a reference must have a value
 _V_LEAST = 3.0  # [m/s] below, no radius is learnt
+_LEARN_S = 10.0  # [s] before the lane from which the delay of v_x is learnt
+_MEAN_S = 0.5  # [s] of both speeds: noise in the wheel's rate would make the delay too small
+_BLOCK_S = 1.0  # [s] within which errors belong together
+_RATE_LEAST = 0.3  # [m/s²] of the rate's standard deviation: less may be noise
+_LATE_MOST = 0.5  # [s] more is no delay of a receiver
+_LATE_OPEN = 0.03  # [s] a delay that is less sure is not taken off; as `campaign.delay.HALF_MAX`
+_BRAKES = 2e5  # [Pa] of the brakes, which make the free wheel slip
 APART = 1.0 / 3.6  # [m/s] references that differ by more are remarked
 
 
 class Speeds(NamedTuple):
     """Speed by the reference and by the other one (n,) [m/s], NaN where unknown; their names, the first empty where
-    there is no speed. `notes`: what is to be said of them, or why a speed is missing.
+    there is no speed. `notes`: what is to be said of them, or why a speed is missing. `late`: delay of `v_x` that was
+    taken off, NaN if none was. [s]
     """
 
     own: FloatArray
     other: FloatArray
     names: tuple[str, str]
     notes: tuple[str, ...] = ()
+    late: float = math.nan
 
 
 def references(
@@ -34,7 +45,8 @@ def references(
     """Return the speeds of a run whose driven axle is `axle` and whose driven wheel on the dry side is `dry`.
 
     `v_x` is the reference if the log has it on nine tenths of the lane, else the free wheel. The radius of that is the
-    vehicle file's; where the file has none, it is learnt from `v_x` before the lane.
+    vehicle file's; where the file has none, it is learnt from `v_x` before the lane. Against the free wheel shows by
+    how much `v_x` is late, which is taken off.
     """
     v_x = signals.array("v_x")
     none = np.full_like(v_x, np.nan)
@@ -48,9 +60,12 @@ def references(
     if has_v_x:
         if not has_free:
             return Speeds(v_x, none, ("v_x", ""), (note or "no free wheel on the dry side checks v_x",))
+        late, unsure = _late(signals, by_wheel, on_lane, before)
+        v_x = earlier(v_x, late if math.isfinite(late) else 0.0, signals.dt)
         apart = float(np.nanmedian(np.abs(v_x - by_wheel)[on_lane]))
         more = (f"v_x and {free} differ by {3.6 * apart:.1f} km/h on the lane",) if apart > APART else ()
-        return Speeds(v_x, by_wheel, ("v_x", free), (*((note,) if note else ()), *more))
+        notes = tuple(x for x in (note, unsure) if x)
+        return Speeds(v_x, by_wheel, ("v_x", free), (*notes, *more), late)
     if has_free:
         own = f"no v_x on the lane: the speed is that of the free wheel {free}"
         return Speeds(by_wheel, none, (free, ""), (own, *((note,) if note else ())))
@@ -59,6 +74,50 @@ def references(
         return Speeds(none, none, ("", ""), (f"{what}all wheels are driven",))
     lack = note or f"{free} is not in the log"
     return Speeds(none, none, ("", ""), (what + lack,))
+
+
+def _late(signals: Signals, by_wheel: FloatArray, on_lane: BoolArray, before: BoolArray) -> tuple[float, str]:
+    """Return by how much v_x is late against the speed of a free wheel [s], or NaN and a note where that is open."""
+    places = np.flatnonzero(on_lane | before)
+    known: BoolArray = np.zeros_like(on_lane)
+    known[max(places[0] - round(_LEARN_S / signals.dt), 0) : places[-1] + 1] = True
+    known &= ~(signals.array("brake_pressure") > _BRAKES)
+    late, sd = lateness(signals.array("v_x"), by_wheel, known, signals.dt)
+    if abs(late) - 1.96 * sd > _LATE_MOST:
+        return math.nan, f"v_x is late by {late:.1f} s against the free wheel: check the clocks (`aqualog align`)"
+    if not 1.96 * sd <= _LATE_OPEN:
+        return math.nan, "the delay of v_x is not known: too even a speed before and on the lane"
+    return late, ""
+
+
+def lateness(v_x: FloatArray, by_wheel: FloatArray, known: BoolArray, dt: float) -> tuple[float, float]:
+    """Return by how much a speed is late against a wheel that rolls freely, and the standard deviation. [s]
+
+    Parameters
+    ----------
+    v_x, by_wheel : array (n,)
+        The speed, and that of the wheel with any radius, `dt` [s] apart. [m/s]
+    known : bool array (n,)
+        Samples without brakes, the wheel on dry road.
+
+    Least squares of v_x over the wheel's speed, its third power (radii grow with v²) and its rate, of means over 0.5 s.
+    Errors within a second belong together. NaN with less than three seconds, or an even speed.
+
+    Source: derived.
+    """
+    v, w = (mean_over(x, _MEAN_S, dt) for x in (v_x, by_wheel))
+    rate = np.gradient(w, dt)
+    usable = known & np.isfinite(v + w + rate) & (v > _V_LEAST)
+    y, w, rate = v[usable], w[usable], rate[usable]
+    if y.size * dt < 3.0 * _BLOCK_S or rate.std() < _RATE_LEAST:
+        return math.nan, math.nan
+    x = np.column_stack([w, w**3 / w.max() ** 2, -rate * (y.sum() / w.sum())])
+    inverse = np.linalg.pinv(x.T @ x)
+    solution = inverse @ (x.T @ y)
+    block = np.flatnonzero(usable) // max(1, round(_BLOCK_S / dt))
+    pull = x * (y - x @ solution)[:, None]
+    sums = np.array([pull[block == b].sum(axis=0) for b in np.unique(block)]) @ inverse
+    return float(solution[2]), float(np.linalg.norm(sums[:, 2]))
 
 
 def _free(

@@ -49,7 +49,7 @@ class StraightRun:
     notes : tuple of str
         What could not be checked.
     a_x : float
-        Mean acceleration before the crossing. [m/s²]
+        Mean acceleration before the crossing, by the speed. [m/s²]
     yaw_rate : float
         Largest size of the yaw rate on the lane before the crossing. [rad/s]
     ratio : float
@@ -62,6 +62,8 @@ class StraightRun:
         [s]
     curve : (array, array)
         Speed [m/s] and slip [-] on the lane, at most 50 a second.
+    late : float
+        By how much `v_x` was late, which is taken off. [s] NaN if nothing was.
     """
 
     speeds: Mapping[str, float] = field(default_factory=dict)
@@ -79,6 +81,7 @@ class StraightRun:
     axle: str = ""
     lane: Span | None = None
     curve: tuple[FloatArray, FloatArray] = field(default=(np.zeros(0), np.zeros(0)), compare=False, repr=False)
+    late: float = math.nan
 
     @property
     def is_censored(self) -> bool:
@@ -105,7 +108,7 @@ def straight_runs(
     Parameters
     ----------
     signals : Signals
-        Wheel speeds are needed, `v_x`, `yaw_rate`, `a_x`, torques, `gear` used where the log has them.
+        Wheel speeds are needed, `v_x`, `yaw_rate`, torques, `gear` used where the log has them.
     vehicle : Vehicle
         Driven axle, track and effective radii.
     limits : StraightLimits, optional
@@ -166,7 +169,7 @@ def straight_run(
         {n: _read(speeds.other, k) for n, k in levels.items()} if speeds.names[1] else {},
         *speeds.names, math.nan if is_reached else float(speeds.own[highest]), seen.reasons,
         (*notes, *speeds.notes, *seen.notes), seen.a_x, seen.yaw_rate, ratio, _read(t, at), side, axle, span,
-        (speeds.own[on_lane][::every], found.slip[on_lane][::every]),
+        (speeds.own[on_lane][::every], found.slip[on_lane][::every]), speeds.late,
     )  # fmt: skip
 
 

@@ -22,11 +22,15 @@ def signals(columns, *, rate=100.0):
 
 
 def straight(
-    *, v_15=78.0, slope=0.01, side="left", axle="f", v_0=50.0, a=1.3, rate=100.0, ratio=1.0, lane=(3.0, 14.0), end=15.0
-):
-    """A run whose wet driven wheel slips by `slope` per km/h, 15 % at `v_15` [km/h], from 0 on; ratio: its radius."""
+    *, v_15=78.0, slope=0.01, side="left", axle="f", v_0=50.0, a=1.3, rate=100.0, ratio=1.0, lane=(3.0, 14.0), end=15.0,
+    begin=0.0,
+):  # fmt: skip
+    """A run whose wet driven wheel slips by `slope` per km/h, 15 % at `v_15` [km/h], from 0 on; ratio: its radius.
+
+    The speed is even until `begin` [s].
+    """
     t = np.arange(0.0, end, 1.0 / rate)
-    v = v_0 * KMH + a * t
+    v = v_0 * KMH + a * np.maximum(t - begin, 0.0)
     on = (t >= lane[0]) & (t <= lane[1])
     slip = np.where(on, np.maximum(0.15 + slope * (v / KMH - v_15), 0.0), 0.0)
     radius = 0.317

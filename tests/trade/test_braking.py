@@ -50,6 +50,8 @@ def test_temperature_and_texture():
     measured = drive() | {"ambient_temperature": np.full(800, 283.15)}
     assert one(measured).temperature == pytest.approx(10.0)
     assert "wetted road" in one(measured).notes[0]
+    deep = one(drive() | {"water_depth": np.full(800, 3e-3)}, conditions=Conditions(1e-3))  # the log's depth counts
+    assert "3.0 mm of water" in deep.reasons[0]
     rough = one(drive(), conditions=Conditions(texture=1.6e-3))
     assert "macrotexture of 1.60 mm" in rough.reasons[0]
 

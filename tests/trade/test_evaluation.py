@@ -21,9 +21,10 @@ from aqualog.trade.entry import Entry
 from aqualog.trade.evaluation import Options, check_control, entries_of, evaluated
 from aqualog.trade.grip import Coefficients
 from aqualog.trade.limits import Limits, defaults, described
-from aqualog.trade.logs import Measured
+from aqualog.trade.logs import Measured, Request, measure_signals
 from aqualog.trade.onset import Onset
 from aqualog.trade.straight import StraightRun
+from tests.trade import made
 
 KMH = 1.0 / 3.6
 
@@ -74,6 +75,23 @@ def test_a_run_with_another_acceleration_does_not_count():
         ("A", [run(78.0), run(78.4), run(78.2), run(90.0, a_x=1.6)]), limits=Limits.of({"straight.a_x_share": 0.5})
     )
     assert wide.valid == 4
+
+
+def test_a_stop_that_abs_did_not_control_does_not_count():
+    stops = [Stop(22.2, 5.6, 33.0, b, b, 20.0, 1e-3, 0.7e-3, 3.0, 5.4) for b in (0.70, 0.71, 0.72, 0.69, 0.30, 0.6)]
+    test = evaluated(entries(("A", stops)), Options("braking", defaults(), ("tyre",)))
+    assert [e.valid for e in test.entries] == [True, True, True, True, False, True]
+    assert test.entries[4].reasons == ("the coefficient is 0.30, more than 20 % from the set's median of 0.69: did ABS "
+                                       "control the brake?",)  # fmt: skip
+
+
+@pytest.mark.parametrize(("told", "counts"), [(7.0, True), (6.0, True), (4.0, False)])
+def test_water_of_another_depth_than_planned(told, counts):
+    drive = made.signals(made.straight())  # 7 mm in the left track
+    planned = Run((Path("a.mf4"),), Path("car.toml"), None, None, {"water_depth_left_mm": told, "water_depth_mm": 0.0})
+    (run,) = measure_signals(drive, made.FWD, planned, Request("straight", defaults(), with_onset=False)).found
+    assert run.valid == counts
+    assert counts or run.reasons == ("7.0 mm of water in the log, 4.0 mm in the campaign",)
 
 
 def test_runs_beyond_the_lane_count_as_above():

@@ -10,7 +10,7 @@ import numpy as np
 from aqualog import __version__
 from aqualog.campaign.bins import Group
 from aqualog.core.intervals import Interval
-from aqualog.report.values import KMH, plain
+from aqualog.report.values import KMH, fields_of, plain
 from aqualog.trade.braking import Stop
 from aqualog.trade.control import Index
 from aqualog.trade.curve import CurvePass
@@ -99,36 +99,22 @@ def _straight(e: Entry, r: StraightRun) -> dict[str, Any]:
         "onset_missing": None if e.onset is None else dict(e.onset.missing), "reference": r.reference or None,
         "other_reference": r.other or None, "v_15_other_kmh": _kmh(r.speeds_other.get("v_15", np.nan)),
         "a_x": plain(r.a_x, 6), "yaw_rate": plain(r.yaw_rate, 6), "radius_ratio": plain(r.ratio),
+        "v_x_late_s": plain(r.late, 4),
         "wet_side": r.wet_side, "axle": r.axle or None, "crossing_s": plain(r.t_15, 6),
         "lane_s": None if r.lane is None else list(r.lane),
     }  # fmt: skip
 
 
 def _pass(p: CurvePass) -> dict[str, Any]:
-    return {
-        "v_entry_kmh": _kmh(p.v_entry),
-        "a_y_dry": plain(p.a_y_dry, 6),
-        "a_y_least": plain(p.a_y_least, 6),
-        "a_y_mean": plain(p.a_y_mean, 6),
-        "radius_m": plain(p.radius, 6),
-        "steer_change": plain(p.steer, 6),
-        "lane_s": None if p.lane is None else list(p.lane),
-    }
+    own = fields_of(p, "a_y_dry", "a_y_least", "a_y_mean", digits=6, radius_m="radius", steer_change="steer")
+    return {"v_entry_kmh": _kmh(p.v_entry), **own, "lane_s": None if p.lane is None else list(p.lane)}
 
 
 def _stop(s: Stop) -> dict[str, Any]:
-    return {
-        "bfc": plain(s.bfc, 6),
-        "bfc_20": plain(s.bfc_20, 6),
-        "distance_m": plain(s.distance, 6),
-        "v_from_kmh": _kmh(s.v_from),
-        "v_to_kmh": _kmh(s.v_to),
-        "temperature_c": plain(s.temperature, 6),
-        "water_depth_mm": plain(1e3 * s.water_depth, 6),
-        "texture_mm": plain(1e3 * s.texture, 6),
-        "start_s": plain(s.start_s, 6),
-        "end_s": plain(s.end_s, 6),
-    }
+    own = fields_of(s, "bfc", "bfc_20", "start_s", "end_s", digits=6, distance_m="distance")
+    depths = {"water_depth_mm": plain(1e3 * s.water_depth, 6), "texture_mm": plain(1e3 * s.texture, 6)}
+    speeds = {"v_from_kmh": _kmh(s.v_from), "v_to_kmh": _kmh(s.v_to)}
+    return own | speeds | depths | {"temperature_c": plain(s.temperature, 6)}
 
 
 def _set(s: SetRow, test: TradeTest) -> dict[str, Any]:

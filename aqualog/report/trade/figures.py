@@ -60,7 +60,7 @@ def _order(test: TradeTest) -> dict[str, Any] | None:
                 ))  # fmt: skip
     data += _control_lines(test)
     noun = "stop" if test.options.kind == "braking" else "run"
-    title = f"in the order of the {noun}s" + (", and the drift of the control" if test.controls else "")
+    title = f"{noun}s in their order" + (", and the control" if test.controls else "")
     return figure(data, title, axis(noun), axis(_UNIT[test.options.kind])) if data else None
 
 

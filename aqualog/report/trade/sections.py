@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from statistics import median
 from textwrap import wrap
 
 from aqualog.core.intervals import Interval
@@ -173,7 +174,9 @@ def _curve_cells(c: CurveSet) -> list[str | Cell]:
 def _legend(test: TradeTest) -> str:
     o = test.options
     if o.kind == "straight":
-        return (
+        late = [f.late for e in test.entries if isinstance(f := e.found, StraightRun) and math.isfinite(f.late)]
+        told = f"v_x is late by {median(late):.2f} s (median of {len(late)} runs): taken off.\n" if late else ""
+        return told + (
             "v_05, minor spin-down, slip slope: signs that come before 15 %, means of the runs that show them.\n"
             "Where runs did not reach 15 %, they count as above their highest speed."
         )
@@ -204,7 +207,14 @@ def _control_lines(test: TradeTest) -> list[Line]:
 def _runs(test: TradeTest) -> Table:
     heads: list[str | tuple[str, str]] = ["Run", "Set", "Counts"]
     if test.options.kind == "straight":
-        heads += ["v_15 [km/h]", ("v_15 by the other reference", "other"), "v_05", "v_10", "v_50", "a_x [m/s²]"]
+        heads += [
+            "v_15 [km/h]",
+            ("v_15 by the other reference", "other"),
+            "v_05",
+            "v_10",
+            "v_50",
+            ("Acceleration [m/s²]", "a [m/s²]"),
+        ]
     elif test.options.kind == "braking":
         heads += ["BFC", "BFC at 20 °C", "way [m]", "water [mm]", "texture [mm]", "°C"]
     else:
