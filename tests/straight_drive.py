@@ -60,7 +60,8 @@ def drive(
     share = np.array([1 - car.torque_split_rear] * 2 + [car.torque_split_rear] * 2) / 2.0
     columns = {"t": t, "yaw_rate": np.zeros(n), "a_y": np.zeros(n)}
     for i, w in enumerate(WHEELS):
-        mu = share[i] * force / load[i] if i in driven else np.zeros(n)
+        own = -car.rolling_resistance - car.inertia(w) / car.r_e(w) ** 2 * a_kin / load[i]  # of a free wheel
+        mu = share[i] * force / load[i] if i in driven else own
         moved = np.interp(t - late, t, mu)
         slip = moved / slope + (0.002 if i in driven else 0.0)
         columns[f"omega_{w}"] = v / (1.0 - slip) / car.r_e(w) + rng.normal(0.0, noise * 22.0 / car.r_e(w), n)

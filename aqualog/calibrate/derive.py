@@ -16,7 +16,7 @@ from aqualog.core.vehicle import KEYS, WATER, Provenance, Vehicle, WaterNumber
 
 __all__ = [
     "FIXABLE", "GAIN_SD", "balance_parameters", "calibrated", "check_fixed", "contradicted", "derived", "estimates",
-    "identified_values", "keeping", "of_kept_mass", "unbalanced_parameters",
+    "identified_values", "keeping", "of_kept_mass", "rotating_share", "unbalanced_parameters",
 ]  # fmt: skip
 
 FIXABLE: Mapping[str, tuple[float, float]] = {
@@ -75,25 +75,24 @@ def estimates(samples: Sequence[Sample], fixed: Mapping[str, float]) -> dict[str
 
 
 def balance_parameters(
-    found: Mapping[str, float], spread: Spread, fixed: Mapping[str, float], vehicle: Vehicle, samples: Sequence[Sample]
-) -> list[Parameter]:
+    found: Mapping[str, float], spread: Spread, fixed: Mapping[str, float], vehicle: Vehicle, samples: Sequence[Sample],
+    rotating: float = 0.0,
+) -> list[Parameter]:  # fmt: skip
     """Return the parameters of the balance with intervals, and why one is not identified.
 
     Without a given mass or torque gain, the gain's 2 % enter the intervals of mass and drag area. All drives share the
-    one signal, so more drives do not reduce this part.
+    one signal, so more drives do not reduce this part. Nor do they that of inertias and radii, see `rotating_share`.
     """
     has_scale = "mass" in fixed or "torque_gain" in fixed
-    parameters = []
+    parameters: list[Parameter] = []
     for name, unit in _UNITS.items():
-        value = found[name]
-        # a gain is that of the torques as they were read, the file's is in them already
-        file_value = float(getattr(vehicle, name)) if name in KEYS and name != "torque_gain" else math.nan
+        value, file_value = found[name], _file_value(name, vehicle)
         if name in fixed:
-            parameters.append(
-                Parameter(name, value, (value, value), unit, identified=True, remark="given", file_value=file_value)
-            )
+            parameters.append(_given(name, value, file_value))
             continue
         half = half_width(spread.sd[name], spread.dof[name])
+        shared = rotating * value if name in ("mass_per_gain", "mass", "torque_gain") else 0.0
+        half = math.hypot(half, 1.96 * shared)
         if name in ("mass", "drag_area") and not has_scale:
             half = math.hypot(half, 1.96 * GAIN_SD * value)
         limit = WIDE_ROLLING if name == "rolling_resistance" else WIDE[name] * value
@@ -105,24 +104,38 @@ def balance_parameters(
         remark = "" if why else words.remark(name, has_scale=has_scale, by_drive=spread.by_drive, samples=samples)
         # without a scale the gain is an assumption, not an estimate
         ci = (math.nan, math.nan) if name == "torque_gain" and not has_scale else (value - half, value + half)
-        parameters.append(Parameter(name, value, ci, unit, not why, why, remark, file_value))
+        parameters.append(Parameter(name, value, ci, unit, not why, why, remark, file_value, shared=shared))
     return parameters
+
+
+def rotating_share(car: Vehicle, mass: float) -> float:
+    """Return the standard deviation of the mass from what is not known of the wheels' inertias and radii, over it. [-]
+
+    The balance's force is (T - I dω/dt) / r: 2 I / r² of an axle is taken for mass, and a radius scales all of it.
+    """
+    share = {"f": 1.0 - car.torque_split_rear, "r": car.torque_split_rear}
+    radius = sum(x * uncertainty(car, f"wheels.r_e_{a}") / car.r_e(f"{a}l") for a, x in share.items())
+    spun = (2.0 * uncertainty(car, f"wheels.inertia_{a}") / car.r_e(f"{a}l") ** 2 for a in share)
+    return math.hypot(radius, *(x / mass for x in spun))
 
 
 def unbalanced_parameters(fixed: Mapping[str, float], vehicle: Vehicle, why: str) -> list[Parameter]:
     """Return the parameters of a balance that the drives do not allow, with the reason; those given stay."""
-    parameters = []
-    for name, unit in _UNITS.items():
-        file_value = float(getattr(vehicle, name)) if name in KEYS and name != "torque_gain" else math.nan
-        if name in fixed:
-            x = fixed[name]
-            parameters.append(Parameter(name, x, (x, x), unit, identified=True, remark="given", file_value=file_value))
-        else:
-            unknown = (math.nan, math.nan)
-            parameters.append(
-                Parameter(name, math.nan, unknown, unit, identified=False, why_not=why, file_value=file_value)
-            )
-    return parameters
+    unknown = (math.nan, math.nan)
+    return [
+        _given(n, fixed[n], _file_value(n, vehicle)) if n in fixed
+        else Parameter(n, math.nan, unknown, unit, identified=False, why_not=why, file_value=_file_value(n, vehicle))
+        for n, unit in _UNITS.items()
+    ]  # fmt: skip
+
+
+def _file_value(name: str, vehicle: Vehicle) -> float:
+    """Return the vehicle file's value. A gain is that of the torques as they were read: the file's is in them."""
+    return float(getattr(vehicle, name)) if name in KEYS and name != "torque_gain" else math.nan
+
+
+def _given(name: str, value: float, file_value: float) -> Parameter:
+    return Parameter(name, value, (value, value), _UNITS[name], identified=True, remark="given", file_value=file_value)
 
 
 DIGITS = 7  # of a value in a file: more than any interval has
@@ -195,7 +208,8 @@ def identified_values(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict
 def _sd(key: str, value: float, p: Parameter, vehicle: Vehicle) -> float | None:
     """Return the standard deviation of a calibrated value, in the key's unit, so that 1.96 of it is the interval.
 
-    A radius by the ratio alone is as sure as ratio and the file's mean radius, whose error both axles share.
+    A radius by the ratio alone is as sure as ratio and the file's mean radius, whose error both axles share. Errors of
+    inertias and radii are left out: those keys have deviations of their own, which the same drives would count twice.
     """
     sd = 0.5 * (p.ci95[1] - p.ci95[0]) / 1.96
     if not math.isfinite(sd) or sd <= 0.0:
@@ -204,8 +218,8 @@ def _sd(key: str, value: float, p: Parameter, vehicle: Vehicle) -> float | None:
         mean = 0.5 * sum(uncertainty(vehicle, f"wheels.r_e_{axle}") for axle in "fr")
         share = 1.0 / (1.0 + p.value) / (p.value if key == "wheels.r_e_f" else 1.0)  # d ln r / d ratio
         sd = math.hypot(share * value * sd, mean)
-    elif p.value:
-        sd *= abs(value / p.value)  # of the gain that the file has already, and of a mass that is kept
+    elif p.value:  # of the gain that the file has already, and of a mass that is kept
+        sd = math.sqrt(max(sd**2 - p.shared**2, 0.0)) * abs(value / p.value)
     return float(f"{sd:.3g}")
 
 

@@ -17,7 +17,8 @@ class Parameter:
     `ci95` is its interval, NaN without one. `identified`: whether the drives identify it (with what was fixed and the
     named assumptions). `why_not` says what they lack, empty where identified; `remark` what the interval rests on.
     `file_value` is that of the vehicle file, NaN where the file has no such key. `kept`: the user gave that value, the
-    interval excludes it, and nobody has accepted the estimate: the file's value stays.
+    interval excludes it, and nobody has accepted the estimate: the file's value stays. `shared`: standard deviation by
+    errors of the file's inertias and radii, which is in the interval.
     """
 
     name: str
@@ -29,6 +30,7 @@ class Parameter:
     remark: str = ""
     file_value: float = float("nan")
     kept: bool = False
+    shared: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,20 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.calibrate import words
+from aqualog.calibrate import derive, words
 from aqualog.calibrate.balance import Sample, energy_offset, fit_balance, residual
-from aqualog.calibrate.derive import (
-    balance_parameters,
-    calibrated,
-    check_fixed,
-    contradicted,
-    derived,
-    estimates,
-    identified_values,
-    keeping,
-    of_kept_mass,
-    unbalanced_parameters,
-)
 from aqualog.calibrate.design import Drive, prepare
 from aqualog.calibrate.radii import radius_parameters
 from aqualog.calibrate.records import Calibration, DriveFit, Parameter
@@ -139,7 +127,7 @@ def calibrate(
         If a signal is missing, too little is driven, or a fixed value is impossible.
     """
     fixed = dict(fixed or {})
-    check_fixed(fixed)
+    derive.check_fixed(fixed)
     all_drives = [prepare(s, vehicle, n) for s, n in zip(drives, names, strict=True)]
     usable = [d for d in all_drives if d.windows.v.size >= LEAST_WINDOWS]
     if not usable:
@@ -149,20 +137,21 @@ def calibrate(
             hint="what was left out: " + "; ".join(f"{d.name}: {words.left_out(d.left_out)}" for d in all_drives),
         )  # fmt: skip
     radii = radius_parameters(usable, vehicle)
-    usable = _by_lever(usable, vehicle, calibrated(vehicle, radii if accept else keeping(radii, vehicle)))
+    rolling = derive.calibrated(vehicle, radii if accept else derive.keeping(radii, vehicle))
+    usable = _by_lever(usable, vehicle, rolling)
     samples = [Sample(d.windows, energy_offset(d)) for d in usable]
     # without the driven axle the torques of the log need not be all of the drive
     lacking = next((d.no_balance for d in usable if d.no_balance), "")
     if lacking:
         balance = _no_balance(usable, samples, fixed, vehicle, lacking)
     else:
-        balance = _balance(usable, samples, fixed, vehicle)
+        balance = _balance(usable, samples, fixed, vehicle, rolling)
     fits, found, spread = balance.fits, balance.found, balance.spread
     estimated = (*balance.parameters, *radii, *_offsets(fits, samples, balance.levels, fixed))
     if not accept:
-        estimated = of_kept_mass(estimated, vehicle)
-    parameters = estimated if accept else keeping(estimated, vehicle)
-    car = calibrated(vehicle, parameters)
+        estimated = derive.of_kept_mass(estimated, vehicle)
+    parameters = estimated if accept else derive.keeping(estimated, vehicle)
+    car = derive.calibrated(vehicle, parameters)
     scale = car.torque_gain / vehicle.torque_gain
     rods, missing = ({}, ()) if lacking else transfers(all_drives, car, torque_scale=scale)
     skipped = [
@@ -174,8 +163,8 @@ def calibrate(
     differing = {
         n: sd * scale_of.get(n, 1.0) for n, sd in one_more(spread, len(samples)).items() if n in shown and sd > 0.0
     }
-    odd = words.contradictions(contradicted(estimated, vehicle), found.get("torque_gain", 1.0), accepted=accept)
-    written = identified_values(parameters, vehicle)
+    odd = words.contradictions(derive.contradicted(estimated, vehicle), found.get("torque_gain", 1.0), accepted=accept)
+    written = derive.identified_values(parameters, vehicle)
     notes = (*odd, *words.notes(fits, samples, found, fixed, written, by_drive=spread.by_drive), *skipped)
     return Calibration(
         vehicle.name, parameters, tuple(fits), fixed, words.cannot_tell(parameters, missing), notes, rods, differing
@@ -208,13 +197,14 @@ class _Balanced(NamedTuple):
 
 
 def _balance(
-    usable: Sequence[Drive], samples: Sequence[Sample], fixed: Mapping[str, float], vehicle: Vehicle
+    usable: Sequence[Drive], samples: Sequence[Sample], fixed: Mapping[str, float], vehicle: Vehicle, rolling: Vehicle
 ) -> _Balanced:
     best = fit_balance(samples, fixed)
-    spread = spread_of(partial(estimates, fixed=fixed), samples, drag=best.drag, air_density=vehicle.air_density)
-    found = derived(best, fixed)
+    spread = spread_of(partial(derive.estimates, fixed=fixed), samples, drag=best.drag, air_density=vehicle.air_density)
+    found = derive.derived(best, fixed)
     fits = drive_fits(usable, samples, found, vehicle)
-    parameters = balance_parameters(found, spread, fixed, vehicle, samples)
+    rotating = derive.rotating_share(rolling, found["mass_per_gain"])
+    parameters = derive.balance_parameters(found, spread, fixed, vehicle, samples, rotating)
     return _Balanced(parameters, fits, found, spread, best.levels.tolist())
 
 
@@ -230,7 +220,7 @@ def _no_balance(
         )
         for d, s in zip(usable, samples, strict=True)
     ]  # fmt: skip
-    parameters = unbalanced_parameters(fixed, vehicle, why)
+    parameters = derive.unbalanced_parameters(fixed, vehicle, why)
     spread = Spread({}, {}, by_drive=len(usable) >= DRIVES_MIN)
     return _Balanced(parameters, fits, dict(fixed), spread, [math.nan] * len(fits))
 

@@ -102,6 +102,8 @@ def remark(name: str, *, has_scale: bool, by_drive: bool, samples: Sequence[Samp
         parts.append("torque taken as true within 2 % rms")
     if name in ("mass", "torque_gain") and has_scale:
         parts.append(ACCELEROMETER)
+    if name in ("mass_per_gain", "torque_gain"):
+        parts.append("inertias and radii as sure as the vehicle file says")
     if name == "drag_area":
         parts.append("with the air density of the vehicle file")
     if name == "rolling_resistance" and not all(s.offset.has_height for s in samples):

@@ -17,7 +17,7 @@ from aqualog.core.moments import Design
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.regression import estimate
-from aqualog.physics.load import wheel_loads
+from aqualog.features.stream import loads_of_car
 from aqualog.physics.traction import residual_traction
 
 __all__ = [
@@ -157,9 +157,7 @@ def spin_ups(
         if residual:
             car = info.vehicle
             a_x = np.nan_to_num(samples.array("a_x"))
-            loads = wheel_loads(
-                a_x, np.zeros_like(a_x), mass=car.mass, l_f=car.l_f, l_r=car.l_r, h_cg=car.h_cg, track=car.track
-            )
+            loads = loads_of_car(car, a_x, np.zeros_like(a_x))
             mu = residual_traction(mu, samples.array("delta_a_x"), loads[WHEELS.index(wheel)], mass=car.mass)
         return Picked({"v_x": samples.array("v_x"), "mu": mu}, {"no spin-up": ~is_spinning(samples, wheel)})
 

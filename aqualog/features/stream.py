@@ -21,7 +21,7 @@ from aqualog.physics.load import wheel_loads
 from aqualog.physics.resistance import nominal_acceleration
 from aqualog.physics.traction import residual_traction, traction_coefficient
 
-__all__ = ["INPUTS", "FeatureStream", "Features"]
+__all__ = ["INPUTS", "FeatureStream", "Features", "loads_of_car"]
 
 # Signals that features read. Truth and labels are not among them, so that no detector can see them.
 INPUTS = (
@@ -36,6 +36,11 @@ TAU_COMMON = 0.3  # [s] what all wheels share is an error of the velocity (a lat
 TAU_LOAD = 0.10  # [s] load transfer follows the body, not the accelerometer's noise
 
 Features = Mapping[str, FloatArray]
+
+
+def loads_of_car(car: Vehicle, a_x: FloatArray, a_y: FloatArray) -> FloatArray:
+    """Wheel loads (4, n) [N] of a car at a specific force forward and left [m/s²], see `wheel_loads`."""
+    return wheel_loads(a_x, a_y, mass=car.mass, l_f=car.l_f, l_r=car.l_r, h_cg=car.h_cg, track=car.track)
 
 
 class FeatureStream:
@@ -105,10 +110,7 @@ class FeatureStream:
         out["a_x_slow"] = self._lowpass("a_x", a_x, TAU_LOAD)
         out["a_y_slow"] = self._lowpass("a_y", np.nan_to_num(a_y), TAU_LOAD)
         out["a_kin_slow"] = self._lowpass("a_kin_slow", a_kin, TAU_LOAD)
-        loads = wheel_loads(
-            out["a_x_slow"], out["a_y_slow"], mass=self.vehicle.mass, l_f=self.vehicle.l_f, l_r=self.vehicle.l_r,
-            h_cg=self.vehicle.h_cg, track=self.vehicle.track,
-        )  # fmt: skip
+        loads = loads_of_car(self.vehicle, out["a_x_slow"], out["a_y_slow"])
         if self._has_torque:
             self._forces(get, omega, loads, out)
         out |= self._steering.push(

@@ -1,5 +1,6 @@
 """Calibration on simulated dry drives."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -366,6 +367,22 @@ def test_without_torques_and_drivetrain_nothing_is_left(series):
         calibrate([none], ["a"], bare)
 
 
+def own_sd(p):
+    """Standard deviation without the part of inertias and radii, which have deviations of their own."""
+    return math.sqrt(((p.ci95[1] - p.ci95[0]) / 3.92) ** 2 - p.shared**2)
+
+
+def test_wrong_inertias_and_radii_are_in_the_interval_of_the_gain(series):
+    signals, true, _, _ = series
+    heavy = replace(believed(true), inertia_f=1.3 * true.inertia_f, inertia_r=1.3 * true.inertia_r)
+    gain = calibrate(signals, ["a", "b"], heavy, {"mass": true.mass}).get("torque_gain")
+    assert gain.ci95[0] < 1.0 < gain.ci95[1]
+    assert abs(gain.value - 1.0) > 2.0 * own_sd(gain)  # by scatter alone it would be outside
+    keys = dict.fromkeys(("wheels.inertia_f", "wheels.inertia_r"), Provenance("measured", 0.01))
+    sure = replace(heavy, provenance=keys, given=heavy.given | set(keys))
+    assert calibrate(signals, ["a", "b"], sure, {"mass": true.mass}).get("torque_gain").shared < gain.shared
+
+
 def test_where_the_values_of_a_calibrated_file_come_from(series, tmp_path):
     signals, true, _, result = series
     before = replace(believed(true), given=frozenset({"name", "drivetrain", "mass", "l_f", "wheels.r_e_f"}))
@@ -375,8 +392,7 @@ def test_where_the_values_of_a_calibrated_file_come_from(series, tmp_path):
     car = load_vehicle(path)
     assert car.provenance == calibrated(before, result.parameters).provenance
     for name, key in (("mass", "mass"), ("drag_area", "drag_area"), ("r_e_f", "wheels.r_e_f")):
-        low, high = result.get(name).ci95
-        assert car.provenance[key] == Provenance("calibrated", pytest.approx((high - low) / 3.92, rel=5e-3))
+        assert car.provenance[key] == Provenance("calibrated", pytest.approx(own_sd(result.get(name)), rel=5e-3))
     assert car.provenance["l_f"] == Provenance("measured", 0.02)  # as before
     assert car.provenance["torque_gain"] == Provenance("guess", 0.02)  # the mass rests on it
     assert car.provenance["wheels.r_l_f"] == Provenance("guess")  # written for the forces, measured by nobody
@@ -385,7 +401,7 @@ def test_where_the_values_of_a_calibrated_file_come_from(series, tmp_path):
     twice = replace(before, torque_gain=2.0, mass=true.mass, provenance={})
     car = calibrated(twice, weighed.parameters)
     assert car.provenance["mass"] == Provenance("measured")
-    assert car.provenance["torque_gain"].sd == pytest.approx((gain.ci95[1] - gain.ci95[0]) / 1.96, rel=5e-3)
+    assert car.provenance["torque_gain"].sd == pytest.approx(2.0 * own_sd(gain), rel=5e-3)
     known = replace(twice, provenance={"mass": Provenance("measured", 3.0)})
     assert calibrated(known, weighed.parameters).provenance["mass"].sd == 3.0
     known = replace(known, mass=true.mass + 5.0)  # of another value

@@ -7,21 +7,8 @@ from importlib.resources import files
 import pytest
 
 from aqualog.core.errors import ConfigError
+from aqualog.thesis import claims as said
 from aqualog.thesis.catalogue import rows
-from aqualog.thesis.claims import (
-    DIFFERENCE,
-    NEEDS_DATA,
-    NOT_REPRODUCED,
-    REPRODUCED,
-    Check,
-    claims,
-    combined,
-    judge,
-    judged,
-    limit,
-    number_of,
-    read,
-)
 from aqualog.thesis.evidence.seeds import Plan, bootstrap, ratio_of_counts, share
 from aqualog.thesis.run import makers
 
@@ -29,8 +16,8 @@ RAW = tomllib.loads(files("aqualog.thesis").joinpath("claims.toml").read_text(en
 
 
 def test_all_118_claims_in_their_order():
-    found = claims()
-    assert [number_of(c) for c in found] == list(range(1, 119))
+    found = said.claims()
+    assert [said.number_of(c) for c in found] == list(range(1, 119))
     assert found["C44"].where == "2.2"
     assert "0.2 m/s²" in found["C44"].statement
     assert found["C117"].kind == "M"
@@ -50,41 +37,41 @@ def test_a_claim_that_is_not_whole_is_refused(change, told):
     raw = {k: dict(v) for k, v in RAW.items()}
     change(raw)
     with pytest.raises(ConfigError, match=told):
-        read(raw)
+        said.read(raw)
 
 
 @pytest.mark.parametrize(
     ("found", "one"),
     [
-        ([REPRODUCED], REPRODUCED),
-        ([REPRODUCED, REPRODUCED], REPRODUCED),
-        ([REPRODUCED, DIFFERENCE], DIFFERENCE),
-        ([REPRODUCED, NOT_REPRODUCED], DIFFERENCE),
-        ([DIFFERENCE, NOT_REPRODUCED], DIFFERENCE),
-        ([NOT_REPRODUCED, NOT_REPRODUCED], NOT_REPRODUCED),
-        ([NEEDS_DATA], NEEDS_DATA),
-        ([NEEDS_DATA, REPRODUCED], DIFFERENCE),
-        ([NEEDS_DATA, DIFFERENCE], DIFFERENCE),
-        ([NEEDS_DATA, NOT_REPRODUCED], NOT_REPRODUCED),
+        ([said.REPRODUCED], said.REPRODUCED),
+        ([said.REPRODUCED, said.REPRODUCED], said.REPRODUCED),
+        ([said.REPRODUCED, said.DIFFERENCE], said.DIFFERENCE),
+        ([said.REPRODUCED, said.NOT_REPRODUCED], said.DIFFERENCE),
+        ([said.DIFFERENCE, said.NOT_REPRODUCED], said.DIFFERENCE),
+        ([said.NOT_REPRODUCED, said.NOT_REPRODUCED], said.NOT_REPRODUCED),
+        ([said.NEEDS_DATA], said.NEEDS_DATA),
+        ([said.NEEDS_DATA, said.REPRODUCED], said.DIFFERENCE),
+        ([said.NEEDS_DATA, said.DIFFERENCE], said.DIFFERENCE),
+        ([said.NEEDS_DATA, said.NOT_REPRODUCED], said.NOT_REPRODUCED),
     ],
 )
 def test_several_checks_make_one_verdict(found, one):
-    assert combined(found) == combined(reversed(found)) == one
+    assert said.combined(found) == said.combined(reversed(found)) == one
 
 
 def test_a_claim_without_a_check_has_none():
     with pytest.raises(ConfigError, match="without a check"):
-        combined([])
+        said.combined([])
 
 
 def test_a_criterion_and_its_weaker_form():
-    assert [judged(whole=a, part=b) for a, b in ((True, True), (False, True), (False, False))] == [
-        REPRODUCED, DIFFERENCE, NOT_REPRODUCED,
+    assert [said.judged(whole=a, part=b) for a, b in ((True, True), (False, True), (False, False))] == [
+        said.REPRODUCED, said.DIFFERENCE, said.NOT_REPRODUCED,
     ]  # fmt: skip
 
 
 def check(**changed):
-    return Check(**{"claim": "C7", "criterion": "a", "found": "b", "verdict": REPRODUCED, **changed})
+    return said.Check(**{"claim": "C7", "criterion": "a", "found": "b", "verdict": said.REPRODUCED, **changed})
 
 
 @pytest.mark.parametrize(
@@ -92,9 +79,9 @@ def check(**changed):
     [
         {"claim": "7"},
         {"claim": "C119"},
-        {"verdict": DIFFERENCE},
-        {"verdict": NOT_REPRODUCED},
-        {"verdict": NEEDS_DATA},
+        {"verdict": said.DIFFERENCE},
+        {"verdict": said.NOT_REPRODUCED},
+        {"verdict": said.NEEDS_DATA},
         {"value": math.nan},
         {"ci95": (1.0, 0.0)},
         {"ci95": (math.nan, 1.0)},
@@ -107,29 +94,29 @@ def test_a_check_that_says_nothing_is_refused(changed):
 
 
 def test_a_judgement_takes_its_texts_from_the_claim():
-    good = judge("C73.figure", "soon", whole=True, value=0.3)
-    assert (good.name, good.verdict, good.reason) == ("C73", REPRODUCED, "")
-    assert f"within {limit('soon'):g} s in 80% of the runs" in good.criterion
-    bad = judge("C62.figure_course", "never", value=math.inf)
-    assert (bad.name, bad.claim, bad.verdict, bad.value) == ("C62 (course)", "C62", NOT_REPRODUCED, None)
+    good = said.judge("C73.figure", "soon", whole=True, value=0.3)
+    assert (good.name, good.verdict, good.reason) == ("C73", said.REPRODUCED, "")
+    assert f"within {said.limit('soon'):g} s in 80% of the runs" in good.criterion
+    bad = said.judge("C62.figure_course", "never", value=math.inf)
+    assert (bad.name, bad.claim, bad.verdict, bad.value) == ("C62 (course)", "C62", said.NOT_REPRODUCED, None)
     assert bad.reason.startswith("The driver pushes")
-    part = judge("C115.half_car", "some", part=True)
-    assert (part.verdict, part.reason) == (DIFFERENCE, "See the numbers.")
+    part = said.judge("C115.half_car", "some", part=True)
+    assert (part.verdict, part.reason) == (said.DIFFERENCE, "See the numbers.")
     # a criterion without a reason of its own shows what is missing
-    assert judge("C106.figure", "one", part=True).reason == "The criterion is met only in part; see the number."
+    assert said.judge("C106.figure", "one", part=True).reason == "The criterion is met only in part; see the number."
     # what is said of every check comes first; some differ by what came out
-    sure, open_ = (judge("C14.passes", "x", whole=w) for w in (True, False))
+    sure, open_ = (said.judge("C14.passes", "x", whole=w) for w in (True, False))
     assert sure.reason.endswith("measured; a simulator, whose tyres and water are assumed, can show its shape only. "
                                 "The other passes have no spin-down.")  # fmt: skip
     assert open_.reason.endswith("The first ones come at a higher speed.")
-    assert judge("C89.half_car", "x").reason == "See the numbers."
-    assert judge("C89.half_car", "x", part=True).reason.startswith("As printed")
+    assert said.judge("C89.half_car", "x").reason == "See the numbers."
+    assert said.judge("C89.half_car", "x", part=True).reason.startswith("As printed")
 
 
 def test_every_claim_has_a_criterion_and_something_that_judges_it():
     judged_by = {c for ids in makers() for c in ids.split()}
     drawn = {c for row in rows().values() for c in row.claims}
-    for claim in claims().values():
+    for claim in said.claims().values():
         assert claim.criteria
         assert ("figure" in {k.split("_")[0] for k in claim.criteria}) == (claim.id in drawn), claim.id
         assert (set(claim.criteria) - {k for k in claim.criteria if k.startswith("figure")} != set()) == (

@@ -16,22 +16,8 @@ from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.braking import BrakeWatch
+from aqualog.detect.slip_slope import direct_inputs as inputs
 from aqualog.detect.slip_slope import estimator
-from aqualog.detect.slip_slope.direct_inputs import (
-    BESIDE,
-    LEFT_OUT,
-    Method,
-    Place,
-    Reference,
-    accelerometer_traction,
-    choose_way,
-    left_out,
-    mean_of,
-    reference_of,
-    slip_of,
-    smoothed,
-    torque_traction,
-)
 from aqualog.detect.slip_slope.direct_records import DirectResult, PlaceSlope, Recursion, notes_on, refuse
 from aqualog.detect.slip_slope.estimator import BLIND, K_MAX, K_MIN, Estimate
 from aqualog.detect.slip_slope.regression import Late, Line, fit_line, lag_of_slip, noise_of_traction
@@ -92,7 +78,7 @@ def slip_slopes(
     if not vehicle.knows_drivetrain:
         torques = {s: signals.array(s) for s in present if s.startswith("torque_")}
         raise no_drivetrain(vehicle, torques, "no slip slope", where=where)
-    way = choose_way(vehicle, present, method=method, traction=traction, where=where)
+    way = inputs.choose_way(vehicle, present, method=method, traction=traction, where=where)
     rate = 1e9 / signals.dt_ns
     if rate < MIN_RATE:
         raise SignalError(
@@ -110,17 +96,19 @@ def slip_slopes(
     columns = {s: signals.array(s) for s in present}
     f = dict(FeatureStream(vehicle, signals.dt, present).push(columns))
     if way.traction == "accelerometer":
-        f |= accelerometer_traction(f, columns["a_x"], vehicle)
+        f |= inputs.accelerometer_traction(f, columns["a_x"], vehicle)
+    if way.method == "axle":
+        f |= inputs.over_free_wheels(f, vehicle, signals.dt)
     braking = BrakeWatch(vehicle, signals.dt).push(f, columns)
     if way.method != "differential":
         f = {n: x for n, x in f.items() if n.startswith(_READ)}  # long drives: the others are half of the memory
-    smooth = {n: smoothed(x, width) if n.startswith(("v_line_", "mu_")) else x for n, x in f.items()}
+    smooth = {n: inputs.smoothed(x, width) if n.startswith(("v_line_", "mu_")) else x for n, x in f.items()}
     del f
     if way.traction == "torque" and way.method == "velocity":
-        smooth |= torque_traction(smooth, columns, vehicle, signals.dt, width)
+        smooth |= inputs.torque_traction(smooth, columns, vehicle, signals.dt, width)
     reference = None
     if way.method == "velocity":
-        reference = reference_of(smoothed(columns["v_x"], width), smooth, vehicle, signals.dt, delay)
+        reference = inputs.reference_of(inputs.smoothed(columns["v_x"], width), smooth, vehicle, signals.dt, delay)
     positive_only = way.traction == "accelerometer" and "brake_pressure" not in present
     drive = _Drive(smooth, reference, braking, vehicle, signals.dt, width, mu_max, positive_only)
     places = tuple(_estimate(place, drive) for place in _places(vehicle, way.method))
@@ -143,16 +131,16 @@ def slip_slopes(
     )  # fmt: skip
 
 
-def _places(vehicle: Vehicle, method: Method) -> list[Place]:
+def _places(vehicle: Vehicle, method: inputs.Method) -> list[inputs.Place]:
     if method == "differential":
         return []
     if method == "velocity":
-        return [Place(w, (w,), ()) for w in vehicle.driven]
+        return [inputs.Place(w, (w,), ()) for w in vehicle.driven]
     axle = vehicle.driven[0][0]
     free = [w for w in WHEELS if w not in vehicle.driven]
-    wheels = [Place(i, (i,), (j,)) for i, j in zip(vehicle.driven, free, strict=True)]
+    wheels = [inputs.Place(i, (i,), (j,)) for i, j in zip(vehicle.driven, free, strict=True)]
     name = {"f": "front axle", "r": "rear axle"}[axle]
-    return [*wheels, Place(name, AXLES[axle], tuple(free))]
+    return [*wheels, inputs.Place(name, AXLES[axle], tuple(free))]
 
 
 # --- estimates -----------------------------------------------------------------------------------------------------
@@ -162,7 +150,7 @@ class _Drive(NamedTuple):
     """What all places of a drive share; `f` smooth features, `width` of the smoothing in samples."""
 
     f: Mapping[str, FloatArray]
-    reference: Reference | None
+    reference: inputs.Reference | None
     braking: Mapping[str, BoolArray]
     vehicle: Vehicle
     dt: float
@@ -182,7 +170,7 @@ class _Samples(NamedTuple):
     late: Late | None
 
 
-def _estimate(place: Place, drive: _Drive) -> PlaceSlope:
+def _estimate(place: inputs.Place, drive: _Drive) -> PlaceSlope:
     reference, dt = drive.reference, drive.dt
     shift = 0.0 if reference is None or reference.delay is None else reference.delay
     doubt = ("", "")
@@ -213,7 +201,7 @@ def _estimate(place: Place, drive: _Drive) -> PlaceSlope:
     is_used = s.reason == 0
     known = None if late is None else late._replace(half=0.5 * (line.delay_ci[1] - line.delay_ci[0]))
     segments = make_segments(s.t, s.x, y, s.label, dt=dt, noise=noise, late=known)
-    counts = np.bincount(s.reason.astype(np.int64), minlength=1 + len(LEFT_OUT))
+    counts = np.bincount(s.reason.astype(np.int64), minlength=1 + len(inputs.LEFT_OUT))
     low, high = np.quantile(s.x, (0.05, 0.95)) if s.x.size else (math.nan, math.nan)
     return PlaceSlope(
         place=place.name,
@@ -225,22 +213,22 @@ def _estimate(place: Place, drive: _Drive) -> PlaceSlope:
         segments=segments,
         stability=judge_stability(s.t, s.x, y, s.label, whole=line, segments=segments, noise=noise, late=late),
         recursion=_recursion(place, line, s.mu, slip, is_used, drive),
-        left_out={name: float(n * dt) for name, n in zip(LEFT_OUT, counts[1:], strict=True)},
+        left_out={name: float(n * dt) for name, n in zip(inputs.LEFT_OUT, counts[1:], strict=True)},
         t=s.t,
         mu=s.x,
         slip=y,
     )
 
 
-def _samples(place: Place, drive: _Drive, v_x: FloatArray | None) -> _Samples:
+def _samples(place: inputs.Place, drive: _Drive, v_x: FloatArray | None) -> _Samples:
     f, reference, dt = drive.f, drive.reference, drive.dt
-    mu, slip = mean_of(f, "mu", place.i), slip_of(place, f, v_x, drive.vehicle)
-    reason = left_out(
+    mu, slip = inputs.mean_of(f, "mu", place.i), inputs.slip_of(place, f, v_x, drive.vehicle)
+    reason = inputs.left_out(
         place, f, mu, slip, drive.braking, width=drive.width, mu_max=drive.mu_max, positive_only=drive.positive_only
     )
     is_open = reference is not None and reference.delay is None
     if reference is not None and is_open:
-        reason[(reason == 0) & np.isnan(reference.a_over_v)] = 1 + LEFT_OUT.index(BESIDE)
+        reason[(reason == 0) & np.isnan(reference.a_over_v)] = 1 + inputs.LEFT_OUT.index(inputs.BESIDE)
     which = np.flatnonzero(reason == 0)
     t = dt * which.astype(np.float64)
     late = Late(reference.a_over_v[which], reference.noise[which]) if reference is not None and is_open else None
@@ -256,7 +244,7 @@ def _goes_on(line: Line, shift: float) -> bool:
 
 
 def _recursion(
-    place: Place, line: Line, mu: FloatArray, slip: FloatArray, is_used: BoolArray, drive: _Drive
+    place: inputs.Place, line: Line, mu: FloatArray, slip: FloatArray, is_used: BoolArray, drive: _Drive
 ) -> Recursion:
     """Run the recursive estimator over the samples of the regression, with the noise of this drive.
 

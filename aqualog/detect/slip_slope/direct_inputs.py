@@ -15,15 +15,15 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.slip_slope import activation
 from aqualog.detect.slip_slope.activation import Limits
+from aqualog.features.stream import loads_of_car
 from aqualog.physics.differential import differential_slip
-from aqualog.physics.load import wheel_loads
 from aqualog.physics.slip import V_MIN, wheel_slip
 from aqualog.physics.traction import traction_coefficient, traction_of_one_axle
 
 __all__ = [
     "BESIDE", "LEFT_OUT", "LIMITS", "METHODS", "TRACTIONS", "Method", "Place", "Reference", "TractionSource", "Way",
-    "accelerometer_traction", "choose_way", "left_out", "mean_of", "reference_of", "slip_of", "smoothed",
-    "torque_traction",
+    "accelerometer_traction", "choose_way", "left_out", "mean_of", "over_free_wheels", "reference_of", "slip_of",
+    "smoothed", "torque_traction",
 ]  # fmt: skip
 
 LIMITS = Limits(a_x_max=6.0, a_y_max=1.0, yaw_rate_max=0.05)  # straighter than the estimator, which has less to lose
@@ -56,10 +56,7 @@ def torque_traction(
 ) -> dict[str, FloatArray]:
     """Return signals as in the features, but without their filters' delays, which would look like a delay of v_x."""
     a_x = columns["a_x"] if "a_x" in columns else f["a_kin_slow"]
-    loads = wheel_loads(
-        smoothed(a_x, width), f["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r, h_cg=vehicle.h_cg,
-        track=vehicle.track,
-    )  # fmt: skip
+    loads = loads_of_car(vehicle, smoothed(a_x, width), f["a_y_slow"])
     found = {}
     for w, load in zip(WHEELS, loads, strict=True):
         if w in vehicle.driving:
@@ -72,9 +69,7 @@ def torque_traction(
 
 def accelerometer_traction(f: Mapping[str, FloatArray], a_x: FloatArray, vehicle: Vehicle) -> dict[str, FloatArray]:
     """Return the traction of the driven wheels by the accelerometer; see `physics.traction.traction_of_one_axle`."""
-    loads = wheel_loads(
-        a_x, f["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r, h_cg=vehicle.h_cg, track=vehicle.track
-    )
+    loads = loads_of_car(vehicle, a_x, f["a_y_slow"])
     driven = [i for i, w in enumerate(WHEELS) if w in vehicle.driven]
     free = [i for i, w in enumerate(WHEELS) if w not in vehicle.driven]
     one = WHEELS[free[0]]
@@ -84,6 +79,22 @@ def accelerometer_traction(f: Mapping[str, FloatArray], a_x: FloatArray, vehicle
         free_wheel_mass=2.0 * vehicle.inertia(one) / vehicle.r_e(one) ** 2,
     )  # fmt: skip
     return {f"mu_{WHEELS[i]}": mu[row] for row, i in enumerate(driven)}
+
+
+def over_free_wheels(f: Mapping[str, FloatArray], vehicle: Vehicle, dt: float) -> dict[str, FloatArray]:
+    """Return the traction of the driven wheels less that of the free one on the same side, as their slip is (3.16).
+
+    A free wheel has the traction that spins it and overcomes its rolling resistance.
+    """
+    loads = loads_of_car(vehicle, f["a_kin_slow"], f["a_y_slow"])
+    found = {}
+    for free, load in ((w, x) for w, x in zip(WHEELS, loads, strict=True) if w not in vehicle.driven):
+        wheel = ("f" if free[0] == "r" else "r") + free[1]
+        found[f"mu_{wheel}"] = f[f"mu_{wheel}"] - traction_coefficient(
+            np.zeros_like(load), load, np.gradient(f[f"v_line_{free}"], dt) / vehicle.r_e(free), arm=vehicle.arm(free),
+            inertia=vehicle.inertia(free), r_w=vehicle.rolling_resistance,
+        )  # fmt: skip
+    return found
 
 
 def smoothed(x: FloatArray, width: int) -> FloatArray:
