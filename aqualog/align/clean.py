@@ -266,7 +266,7 @@ class Cleaner:
         """Return the signal, and the notes on it, once all samples are through."""
         begin = taken.every.first_ns
         notes = []
-        if not self._unit and self._is_explicit:
+        if not self._unit and self._is_explicit and self._symbol.kind != "state":
             notes.append(f"{self.where} has no unit; taken as {self._symbol.unit}")
         if self._rule is not None and self._first_glitch_ns is not None:
             after_s = float(self._first_glitch_ns - begin) * 1e-9

@@ -8,28 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, get_args
 
 from aqualog.config.reader import Table, is_real, quoted, read
+from aqualog.core import vehicle as core
 from aqualog.core.errors import ConfigError
 from aqualog.core.intervals import same_decimals
-from aqualog.core.vehicle import (
-    COEFFICIENTS,
-    KEYS,
-    POLYNOMIALS,
-    SOURCES,
-    SPLIT,
-    SPREAD,
-    WATER,
-    Known,
-    Provenance,
-    TorqueArm,
-    Vehicle,
-    WaterNumber,
-    arm_lines,
-    known_lines,
-    provenance_lines,
-    spread_lines,
-    usual,
-    water_lines,
-)
 
 if TYPE_CHECKING:
     from aqualog.calibrate.records import Calibration, Parameter
@@ -41,12 +22,12 @@ LARGEST_TERM = 1e4  # [N], [N*m] constant and spread: as much as the whole force
 LARGEST_GAIN = 100.0  # [-], [m] of the first power; a rod bears a tenth to a half of the tyre's force (K)
 TYPICAL_FORCE = 1000.0  # [N] at which a higher power may give as much as the first (D)
 
-_SECTIONS = tuple(dict.fromkeys(k.section for k in KEYS.values() if k.section))
-_TABLES = (*_SECTIONS, *POLYNOMIALS, "spread", "provenance", "known", "water")
+_SECTIONS = tuple(dict.fromkeys(k.section for k in core.KEYS.values() if k.section))
+_TABLES = (*_SECTIONS, *core.POLYNOMIALS, "spread", "provenance", "known", "water")
 _TABLES_AND_WORDS = ("name", "drivetrain", "torque_arm", *_TABLES)
 
 
-def load_vehicle(path: Path) -> Vehicle:
+def load_vehicle(path: Path) -> core.Vehicle:
     """Read and check a vehicle file.
 
     A key that is left out takes its default (see `aqualog.core.vehicle.KEYS`); unknown keys are errors.
@@ -61,11 +42,13 @@ def load_vehicle(path: Path) -> Vehicle:
     if not values["name"].isprintable():
         file.add("name", f"name = {values['name']!r:.60} is not one line of printable characters")
     given = {"name", *(n for n in ("drivetrain",) if n in file)}
-    values["drivetrain"] = file.choice("drivetrain", SPLIT, "rwd")
-    values["torque_arm"] = file.choice("torque_arm", get_args(TorqueArm), "effective")
-    for section in POLYNOMIALS:
+    values["drivetrain"] = file.choice("drivetrain", core.SPLIT, "rwd")
+    values["torque_arm"] = file.choice("torque_arm", get_args(core.TorqueArm), "effective")
+    for section in core.POLYNOMIALS:
         values[section] = _polynomial(file.table(section), section)
-    values["spread"] = file.table("spread").numbers({n: _Deviation(KEYS[n].high, KEYS[n].unit) for n in SPREAD})
+    values["spread"] = file.table("spread").numbers(
+        {n: _Deviation(core.KEYS[n].high, core.KEYS[n].unit) for n in core.SPREAD}
+    )
     for name, value in file.values.items():
         if isinstance(value, dict) and name not in _TABLES:
             file.unknown(name, _TABLES)
@@ -78,30 +61,30 @@ def load_vehicle(path: Path) -> Vehicle:
     values["water"] = _water(file.table("water"))
     values["provenance"] = _provenance(file.table("provenance"), given)
     file.faults.raise_if_any()
-    car = Vehicle(**values, given=frozenset(given))
-    unset = {k.name: usual(car, k) for k in KEYS.values() if k.path not in given}
+    car = core.Vehicle(**values, given=frozenset(given))
+    unset = {k.name: core.usual(car, k) for k in core.KEYS.values() if k.path not in given}
     return replace(car, **unset)  # type: ignore[arg-type]
 
 
 def _numbers(table: Table, section: str, names: Iterable[str], values: dict[str, Any], given: set[str]) -> None:
     """Read plain keys of a table into `values`, their paths into `given`."""
-    known = {k.name: k for k in KEYS.values() if k.section == section}
+    known = {k.name: k for k in core.KEYS.values() if k.section == section}
     for name in names:
         if name in known:
             number = table.number(name, known[name])
             if number is not None:
                 values[name] = number
                 given.add(known[name].path)
-        elif section and (name in POLYNOMIALS or name in KEYS):
-            own = f"expected [{name}], a table of its own" if name in POLYNOMIALS else "expected above all tables"
+        elif section and (name in core.POLYNOMIALS or name in core.KEYS):
+            own = f"expected [{name}], a table of its own" if name in core.POLYNOMIALS else "expected above all tables"
             table.add(name, f"{name} stands in [{section}]; {own}")
         else:
             table.unknown(name, known if section else [*known, *_TABLES_AND_WORDS])
 
 
-def _provenance(table: Table, given: set[str]) -> dict[str, Provenance]:
+def _provenance(table: Table, given: set[str]) -> dict[str, core.Provenance]:
     """Read where values come from: a word, or a table with `source` and `sd`."""
-    found: dict[str, Provenance] = {}
+    found: dict[str, core.Provenance] = {}
     for name, value in table.values.items():
         if name in _SECTIONS and isinstance(value, dict):  # `wheels.r_e_f = ...`, where the quotes were left out
             table_of = table.child(name, value)
@@ -109,9 +92,9 @@ def _provenance(table: Table, given: set[str]) -> dict[str, Provenance]:
         else:
             rows = [(table, name, name, value)]
         for own, key, path, said in rows:
-            if path not in KEYS:
+            if path not in core.KEYS:
                 within = key != path
-                own.unknown(key, [k.name for k in KEYS.values() if k.section == name] if within else KEYS)
+                own.unknown(key, [k.name for k in core.KEYS.values() if k.section == name] if within else core.KEYS)
                 continue
             entry = _source_and_sd(own, key, path, said)
             if entry is None:
@@ -122,23 +105,23 @@ def _provenance(table: Table, given: set[str]) -> dict[str, Provenance]:
     return found
 
 
-def _source_and_sd(table: Table, name: str, path: str, said: Any) -> Provenance | None:
+def _source_and_sd(table: Table, name: str, path: str, said: Any) -> core.Provenance | None:
     """Read one entry; None with the fault noted."""
     own = table.child(name, said) if isinstance(said, dict) else None
     source = said if own is None else own.get("source")
     if own is not None:
         own.check_names("source", "sd")
-    if not isinstance(source, str) or source not in SOURCES:
+    if not isinstance(source, str) or source not in core.SOURCES:
         shown = "has no source" if source is None else f"= {repr(source)[:40]} is no source"
-        table.add(name, f"provenance.{path} {shown}; expected one of {quoted(SOURCES)}")
+        table.add(name, f"provenance.{path} {shown}; expected one of {quoted(core.SOURCES)}")
         return None
-    sd = None if own is None else own.number("sd", _Deviation(KEYS[path].high, KEYS[path].unit))
-    return Provenance(source, sd)  # type: ignore[arg-type]
+    sd = None if own is None else own.number("sd", _Deviation(core.KEYS[path].high, core.KEYS[path].unit))
+    return core.Provenance(source, sd)  # type: ignore[arg-type]
 
 
-def _known(table: Table) -> dict[str, Known]:
+def _known(table: Table) -> dict[str, core.Known]:
     """Read known faults: `"signal_delay@torque" = { delay = 0.03, spread = 0.005 }`."""
-    found: dict[str, Known] = {}
+    found: dict[str, core.Known] = {}
     if not table.values:
         return found
     # the effects bring the simulator's records, a tenth of a second: few vehicle files need them
@@ -163,19 +146,19 @@ def _known(table: Table) -> dict[str, Known]:
         except ConfigError as error:
             table.add(key, error.line())
             continue
-        found[name if place is None else f"{name}@{place}"] = Known(values, spread or 0.0)
+        found[name if place is None else f"{name}@{place}"] = core.Known(values, spread or 0.0)
     return found
 
 
-def _water(table: Table) -> dict[str, WaterNumber]:
+def _water(table: Table) -> dict[str, core.WaterNumber]:
     """Read numbers of the law of water: `v_anchor = { value = 33.1, sd = 0.4 }`, or the plain number."""
-    table.check_names(*WATER)
-    found: dict[str, WaterNumber] = {}
+    table.check_names(*core.WATER)
+    found: dict[str, core.WaterNumber] = {}
     if not table.values:
         return found
     from aqualog.model.tyre import TYRE_KEYS
 
-    for name in (n for n in table.values if n in WATER):
+    for name in (n for n in table.values if n in core.WATER):
         given, key = table.get(name), TYRE_KEYS[name]
         own = table.child(name, given if isinstance(given, dict) else {name: given})
         own.check_names("value", "sd", "source") if isinstance(given, dict) else None
@@ -185,8 +168,8 @@ def _water(table: Table) -> dict[str, WaterNumber]:
                 table.add(name, f"water.{name} has no value; expected {{ value = ..., sd = ... }}")
             continue
         sd = own.number("sd", _Deviation(key.high, key.unit)) if isinstance(given, dict) else None
-        source = own.choice("source", SOURCES, "calibrated") if isinstance(given, dict) else "data_sheet"
-        found[name] = WaterNumber(value, sd or 0.0, source)  # type: ignore[arg-type]
+        source = own.choice("source", core.SOURCES, "calibrated") if isinstance(given, dict) else "data_sheet"
+        found[name] = core.WaterNumber(value, sd or 0.0, source)  # type: ignore[arg-type]
     return found
 
 
@@ -202,8 +185,8 @@ def _polynomial(table: Table, section: str) -> dict[str, tuple[float, ...]]:
     """Read `F = c0 + c_y F_y + c_x F_x`, higher powers as lists."""
     result: dict[str, tuple[float, ...]] = {}
     for name, value in table.values.items():
-        if name not in COEFFICIENTS:
-            table.unknown(name, COEFFICIENTS)
+        if name not in core.COEFFICIENTS:
+            table.unknown(name, core.COEFFICIENTS)
             continue
         numbers = value if isinstance(value, list) else [value]
         wrong = _wrong(name, numbers)
@@ -230,7 +213,7 @@ def _wrong(name: str, numbers: list[Any]) -> str:
     return ""
 
 
-def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
+def calibrated_toml(vehicle: core.Vehicle, calibration: Calibration) -> str:
     """Return the text of a vehicle file that `load_vehicle` reads.
 
     Keys that neither the old file gives nor the drives identify stand as comments: no default looks like a given value.
@@ -244,9 +227,9 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
     drives = ", ".join(_plain(d.name) for d in calibration.drives)
     # a comment where the driven axle is not known, so that no assumption looks given
     axle = f'drivetrain = "{new.drivetrain}"' if new.knows_drivetrain else '# drivetrain: SET "rwd", "fwd" or "awd"'
-    lines = [f"# calibrated from {drives}", f'name = "{name}"', axle, *arm_lines(new)]
+    lines = [f"# calibrated from {drives}", f'name = "{name}"', axle, *core.arm_lines(new)]
     section = ""
-    for key in KEYS.values():
+    for key in core.KEYS.values():
         if key.section != section:
             section = key.section
             lines += ["", f"[{section}]"]
@@ -261,14 +244,15 @@ def calibrated_toml(vehicle: Vehicle, calibration: Calibration) -> str:
             line = f"# {line}; not identified, default"
         lines.append(line)
     if new.spread:
-        lines += ["", "[spread]", "# standard deviation by which one more drive differs", *spread_lines(new)]
+        lines += ["", "[spread]", "# standard deviation by which one more drive differs", *core.spread_lines(new)]
     if new.provenance:
-        lines += ["", "[provenance]", "# where a value comes from; sd: its standard deviation", *provenance_lines(new)]
+        lines += ["", "[provenance]", "# where a value comes from; sd: its standard deviation"]
+        lines += core.provenance_lines(new)
     if new.known:
-        lines += ["", "[known]", "# faults of this car that are known", *known_lines(new)]
+        lines += ["", "[known]", "# faults of this car that are known", *core.known_lines(new)]
     if new.water:
-        lines += ["", "[water]", "# how its tyres float", *water_lines(new)]
-    for part in POLYNOMIALS:
+        lines += ["", "[water]", "# how its tyres float", *core.water_lines(new)]
+    for part in core.POLYNOMIALS:
         table = getattr(new, part)
         if not table:
             continue

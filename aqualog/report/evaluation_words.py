@@ -6,22 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 
 from aqualog.detect.registry import RIVALS
+from aqualog.evaluate import score
 from aqualog.evaluate.judge import LIMITS_S
 from aqualog.evaluate.records import RunRecord
 from aqualog.evaluate.run import Evaluation, Tuning
-from aqualog.evaluate.score import (
-    HOUR_S,
-    TARGETS,
-    Better,
-    Rate,
-    Recall,
-    Score,
-    better_rivals,
-    coverage,
-    is_rival,
-    score_all,
-    situation_scores,
-)
 from aqualog.evaluate.sweep import JOINT
 from aqualog.report.values import upper_first
 
@@ -41,12 +29,12 @@ def title_of(detector: str) -> str:
     """`spin_down` -> `spin-down`; a rival with its reference, one in the log by its name."""
     if detector in RIVALS:
         return f"{RIVALS[detector].title} {RIVALS[detector].reference}"
-    if is_rival(detector):
+    if score.is_rival(detector):
         return detector
     return detector.replace("_", " ")
 
 
-def recall_text(r: Recall) -> str:
+def recall_text(r: score.Recall) -> str:
     """`12/13 (92 %)`; a dash without episodes."""
     return f"{r.found}/{r.episodes} ({percent(r.share)})" if r.episodes else "-"
 
@@ -59,7 +47,7 @@ def percent(share: float) -> str:
     return f"{text} %"
 
 
-def rate_text(rate: Rate) -> str:
+def rate_text(rate: score.Rate) -> str:
     """`0.4 (0.1 ... 1.4)` per hour, a dash without time."""
     if not rate.seconds > 0.0:
         return "-"
@@ -92,7 +80,7 @@ def seconds_text(x: float) -> str:
 
 def headline(evaluation: Evaluation) -> str:
     """The verdict in one sentence: the best joint detector, else the best of all."""
-    scores = score_all(evaluation.records)
+    scores = score.score_all(evaluation.records)
     ran = {n: s for n, s in scores.items() if s.runs}
     joint = [ran[n] for n in JOINT if n in ran]
     if not ran:
@@ -103,18 +91,18 @@ def headline(evaluation: Evaluation) -> str:
 
 def verdicts(records: Sequence[RunRecord]) -> list[str]:
     """A sentence for each joint detector: its result against the targets."""
-    scores = score_all(records)
+    scores = score.score_all(records)
     return [f"{title_of(n)} {_did(scores[n])}; {_against(scores[n])}." for n in JOINT if n in scores and scores[n].runs]
 
 
-def _against(s: Score) -> str:
+def _against(s: score.Score) -> str:
     """A result against the targets."""
     lacks = [
-        f"{effect} {percent(r.share)}, target {percent(TARGETS[effect])}"
+        f"{effect} {percent(r.share)}, target {percent(score.TARGETS[effect])}"
         for effect, r in (("full", s.full), ("partial", s.partial))
-        if r.episodes and r.share < TARGETS[effect]
+        if r.episodes and r.share < score.TARGETS[effect]
     ]
-    target, alarms = TARGETS["per_hour"], s.false_alarms
+    target, alarms = score.TARGETS["per_hour"], s.false_alarms
     if alarms.seconds > 0.0 and alarms.per_hour > target:
         lacks.append(f"{alarms.per_hour:.3g} false alarms per hour, target {target:g}")
     if lacks:
@@ -127,49 +115,49 @@ def _against(s: Score) -> str:
     return "all targets are met"
 
 
-def _did(s: Score) -> str:
+def _did(s: score.Score) -> str:
     parts = [
         f"found {recall_text(r)} of {effect} aquaplaning within {LIMITS_S[effect]:g} s"
         for effect, r in (("full", s.full), ("partial", s.partial))
         if r.episodes
     ]
-    hours = s.false_alarms.seconds / HOUR_S
+    hours = s.false_alarms.seconds / score.HOUR_S
     parts.append(f"raised {s.false_alarms.count} false alarms in {hours:.3g} h outside water")
     return ", ".join(parts)
 
 
-def _merit(s: Score) -> tuple[int, float, float]:
+def _merit(s: score.Score) -> tuple[int, float, float]:
     """Rank by targets met, then recall, then few false alarms."""
     shares = {effect: r.share for effect, r in (("full", s.full), ("partial", s.partial)) if r.episodes}
-    met = sum(share >= TARGETS[effect] for effect, share in shares.items())
-    met += s.false_alarms.per_hour <= TARGETS["per_hour"]
+    met = sum(share >= score.TARGETS[effect] for effect, share in shares.items())
+    met += s.false_alarms.per_hour <= score.TARGETS["per_hour"]
     return met, (sum(shares.values()) / len(shares) if shares else 0.0), -s.false_alarms.count
 
 
 def coverage_sentences(records: Sequence[RunRecord]) -> list[str]:
     """Number of situations in which each detector meets the targets (C78)."""
     return [
-        f"{title_of(c.detector)}: finds {percent(TARGETS['partial'])} of partial aquaplaning in {c.found} of "
+        f"{title_of(c.detector)}: finds {percent(score.TARGETS['partial'])} of partial aquaplaning in {c.found} of "
         f"{c.of_aquaplaning} situations, quiet in {c.quiet} of {c.of_dry}"
-        for c in coverage(situation_scores(records)).values()
+        for c in score.coverage(score.situation_scores(records)).values()
         if c.of_aquaplaning or c.of_dry
     ]
 
 
 def better_sentences(records: Sequence[RunRecord]) -> list[str]:
     """Cases in which a rival is better than the thesis' method, or a sentence that there is no such case."""
-    if not any(is_rival(n) for r in records for n in r.detectors):
+    if not any(score.is_rival(n) for r in records for n in r.detectors):
         return []
-    found = better_rivals(records)
+    found = score.better_rivals(records)
     if not found:
         return ["No rival is better than the thesis' methods on the same drives."]
-    groups: dict[tuple[str, str, str], list[Better]] = {}
+    groups: dict[tuple[str, str, str], list[score.Better]] = {}
     for b in found:
         groups.setdefault((b.rival, b.against, b.situation), []).append(b)
     return [_better(key, some) for key, some in groups.items()]
 
 
-def _better(key: tuple[str, str, str], some: Sequence[Better]) -> str:
+def _better(key: tuple[str, str, str], some: Sequence[score.Better]) -> str:
     rival, against, situation = key
     where = f" in {situation}" if situation else " over all drives"
     things = []
@@ -182,7 +170,7 @@ def _better(key: tuple[str, str, str], some: Sequence[Better]) -> str:
     return f"{title_of(rival)} {verb} than {title_of(against)}{where}: {'; '.join(things)}{price}."
 
 
-def tuning_sentences(tuning: Tuning, before: Mapping[str, Score], after: Mapping[str, Score]) -> list[str]:
+def tuning_sentences(tuning: Tuning, before: Mapping[str, score.Score], after: Mapping[str, score.Score]) -> list[str]:
     """Drives used for tuning, and the result of each proposal on drives not used for tuning."""
     lines = [
         f"thresholds proposed on {len(tuning.tuned_on)} drives, reported on {len(tuning.reported_on)} others"
@@ -198,6 +186,6 @@ def tuning_sentences(tuning: Tuning, before: Mapping[str, Score], after: Mapping
             )
         lines.append(
             f"{title_of(name)}: {p.threshold:.4g} ({p.factor:.2g} times), {choice.reason} "
-            f"({p.false_alarms.count} in {p.false_alarms.seconds / HOUR_S:.3g} h){told}"
+            f"({p.false_alarms.count} in {p.false_alarms.seconds / score.HOUR_S:.3g} h){told}"
         )
     return lines

@@ -178,7 +178,19 @@ def _read(
         value = area_under(v, curve, low, high) / (high - low)
     else:
         value = float(np.interp(low, v, curve))
-    return value, float(v[np.argmax(mean)]), falls_to(v, least, 0.5 * dry), falls_to(v, least, limits.a_y_zero)
+    return value, _top(v, mean), falls_to(v, least, 0.5 * dry), falls_to(v, least, limits.a_y_zero)
+
+
+def _top(v: FloatArray, mean: FloatArray) -> float:
+    """Return the speed at which a curve is greatest: the vertex of a parabola through the highest step and its
+    neighbours, which are half a step away at the most; at an end the step itself.
+    """
+    k = int(np.argmax(mean))
+    if not 0 < k < v.size - 1:
+        return float(v[k])
+    bend, slope, _ = np.polyfit(v[k - 1 : k + 2] - v[k], mean[k - 1 : k + 2], 2)
+    ends = 0.5 * (v[k - 1] - v[k]), 0.5 * (v[k + 1] - v[k])
+    return float(v[k] + np.clip(-0.5 * slope / bend, *ends)) if bend < 0.0 else float(v[k])
 
 
 def _draws(good: _Steps, v: FloatArray, limits: CurveLimits, result: CurveResult, between: Interval) -> FloatArray:

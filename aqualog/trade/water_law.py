@@ -201,7 +201,7 @@ def _parameter(name: str, log: float, half: float, tyre: Tyre, *, at_edge: bool)
     elif half > _WIDE[name]:
         why = f"known to {100 * half:.0f} % only; more passes between partial and full aquaplaning are needed"
     key = TYRE_KEYS[name]
-    remark = "" if why else "from passes over water; slip slope and friction as in the vehicle file"
+    remark = "" if why else "from passes over water, by this law; slip slope and friction as in the vehicle file"
     return Parameter(name, value, (low, high), key.unit, not why, why, remark, float(getattr(tyre, name)))
 
 

@@ -53,3 +53,10 @@ def test_all_in_use(paths, tmp_path):
         file = "a.csv"
 
     assert idle_files(Log(), {"v_x": (None, Info())}) == []
+
+
+def test_a_state_needs_no_unit(tmp_path):
+    entries = {s: Entry(s, (c,)) for s, c in (("v_x", "Speed"), ("gear", "Gang"))}
+    log = table(tmp_path / "log.csv", "Speed", "Gang")
+    notes = load_signals([log], vehicle=Vehicle(), signal_map=SignalMap(entries)).quality.notes
+    assert [n.split(" has")[0] for n in notes if "has no unit" in n] == ["log.csv:Speed"]

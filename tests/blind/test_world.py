@@ -10,21 +10,6 @@ import numpy as np
 import pytest
 
 from tests.blind.world import cases
-from tests.blind.world.cases import (
-    CARS,
-    NOISES,
-    POOLS,
-    PROGRAMMES,
-    UNKNOWN,
-    Hidden,
-    Spec,
-    clean_drive,
-    clean_pair,
-    clean_rows,
-    implied,
-    make_case,
-    truth,
-)
 from tests.blind.world.effects import scaled
 from tests.blind.world.kernel import OUT
 from tests.blind.world.pools import SUITED
@@ -38,7 +23,7 @@ FOLDER = Path(cases.__file__).parent
 
 @cache
 def rows_of(spec):
-    return clean_rows(spec, cases.world_of(spec))[0]
+    return cases.clean_rows(spec, cases.world_of(spec))[0]
 
 
 def of(rows, name):
@@ -79,28 +64,28 @@ def fit(signature, residual):
 
 
 def hide(effect, where=None, **values):
-    return (Hidden(effect, where, values),)
+    return (cases.Hidden(effect, where, values),)
 
 
 # every car and every programme, not every pair of them
-TOGETHER = [(p, list(CARS)[i % len(CARS)]) for i, p in enumerate(PROGRAMMES)]
-TOGETHER += [("mixed", car) for car in CARS if ("mixed", car) not in TOGETHER]
+TOGETHER = [(p, list(cases.CARS)[i % len(cases.CARS)]) for i, p in enumerate(cases.PROGRAMMES)]
+TOGETHER += [("mixed", car) for car in cases.CARS if ("mixed", car) not in TOGETHER]
 
 
 @pytest.mark.nightly
 @pytest.mark.parametrize(("programme", "vehicle"), [t for t in TOGETHER if t[0] in cases.EXACT_PROGRAMMES])
 def test_forces_balance_by_the_vehicle_file(programme, vehicle):
-    signals, same = clean_pair(Spec(programme, "white", seed=4, vehicle=vehicle, duration_s=SHORT))
-    left = unexplained(signals, CARS[vehicle])
+    signals, same = cases.clean_pair(cases.Spec(programme, "white", seed=4, vehicle=vehicle, duration_s=SHORT))
+    left = unexplained(signals, cases.CARS[vehicle])
     assert signals.frame.equals(same.frame)
     # the forces at work are those of driving and of all resistances
-    size = np.sqrt(np.nanmean(signals.array("a_x") ** 2) + (CARS[vehicle].rolling_resistance * G) ** 2)
+    size = np.sqrt(np.nanmean(signals.array("a_x") ** 2) + (cases.CARS[vehicle].rolling_resistance * G) ** 2)
     assert np.sqrt(np.nanmean(left**2)) < 0.01 * max(size, 0.5)
     assert abs(np.nanmean(left)) < 0.003
 
 
 def test_speed_is_the_integral_of_force_and_position_that_of_speed():
-    rows = rows_of(Spec("mixed", "white", hide("road_grade", grade=0.02), seed=2, duration_s=SHORT))
+    rows = rows_of(cases.Spec("mixed", "white", hide("road_grade", grade=0.02), seed=2, duration_s=SHORT))
     v, t = of(rows, "v_x"), np.arange(len(rows)) * 0.01
     pull = of(rows, "a_x") - G * np.sin(of(rows, "grade")) + of(rows, "yaw_rate") * of(rows, "v_y")
     gained = np.concatenate([[0.0], np.cumsum(0.5 * (pull[1:] + pull[:-1]) * 0.01)])
@@ -111,8 +96,8 @@ def test_speed_is_the_integral_of_force_and_position_that_of_speed():
 
 
 def test_wheel_torque_is_what_the_tyre_and_the_rolling_take():
-    spec = Spec("handling", "white", seed=6, vehicle="suv_awd", duration_s=SHORT)
-    rows, car = rows_of(spec), CARS["suv_awd"]
+    spec = cases.Spec("handling", "white", seed=6, vehicle="suv_awd", duration_s=SHORT)
+    rows, car = rows_of(spec), cases.CARS["suv_awd"]
     for i, w in enumerate(WHEELS):
         spin = car.inertia(w) * np.gradient(of(rows, f"omega_{w}"), 0.01)
         rolling = car.rolling_resistance * wheels(rows, "F_z")[i] * car.arm(w)
@@ -121,7 +106,7 @@ def test_wheel_torque_is_what_the_tyre_and_the_rolling_take():
 
 
 def test_loads_carry_the_weight_and_move_with_acceleration():
-    rows, car = rows_of(Spec("handling", "white", seed=3, duration_s=SHORT)), CARS["sedan_rwd"]
+    rows, car = rows_of(cases.Spec("handling", "white", seed=3, duration_s=SHORT)), cases.CARS["sedan_rwd"]
     F_z = wheels(rows, "F_z")
     assert np.allclose(F_z.sum(axis=0), car.mass * G, rtol=1e-9)
     front = F_z[:2].sum(axis=0) - car.mass * G * car.l_r / car.wheelbase
@@ -134,8 +119,8 @@ def test_loads_carry_the_weight_and_move_with_acceleration():
 
 @pytest.mark.parametrize(("kind", "at_origin"), [("origin", 1.0), ("magic", 0.962), ("parabola", 1.0)])
 def test_slip_slope_is_that_of_the_vehicle_file(kind, at_origin):
-    spec = Spec("mixed", "white", seed=5, vehicle="estate_fwd", tyre=kind, duration_s=120.0)
-    rows, car = rows_of(spec), CARS["estate_fwd"]
+    spec = cases.Spec("mixed", "white", seed=5, vehicle="estate_fwd", tyre=kind, duration_s=120.0)
+    rows, car = rows_of(spec), cases.CARS["estate_fwd"]
     mu, s = of(rows, "F_x_fl") / of(rows, "F_z_fl"), of(rows, "slip_fl")
     static = car.mass * G * car.l_r / car.wheelbase / 2.0
     fair = np.abs(of(rows, "F_z_fl") / static - 1.0) < 0.02
@@ -152,9 +137,9 @@ def test_slip_slope_is_that_of_the_vehicle_file(kind, at_origin):
 @pytest.mark.parametrize("vehicle", ["sedan_rwd", "electric_awd"])
 @pytest.mark.parametrize("programme", ["handling", "stop_and_go", "wet"])
 def test_finer_steps_change_nothing(programme, vehicle):
-    spec = Spec(programme, "white", seed=8, vehicle=vehicle, duration_s=30.0)
+    spec = cases.Spec(programme, "white", seed=8, vehicle=vehicle, duration_s=30.0)
     world = cases.world_of(spec)
-    coarse, fine = (clean_rows(spec, world, refine=k)[0] for k in (1, 4))
+    coarse, fine = (cases.clean_rows(spec, world, refine=k)[0] for k in (1, 4))
     assert np.max(np.abs(of(coarse, "v_x") - of(fine, "v_x"))) < 2e-3
     moving = of(fine, "v_x") > 2.0
     assert np.max(np.abs(wheels(coarse, "slip") - wheels(fine, "slip"))[:, moving]) < 2e-4
@@ -162,7 +147,7 @@ def test_finer_steps_change_nothing(programme, vehicle):
 
 @pytest.mark.parametrize(("programme", "vehicle"), TOGETHER)
 def test_drives_are_drives(programme, vehicle):
-    rows = rows_of(Spec(programme, "white", seed=7, vehicle=vehicle, duration_s=SHORT))
+    rows = rows_of(cases.Spec(programme, "white", seed=7, vehicle=vehicle, duration_s=SHORT))
     assert np.isfinite(rows).all()
     assert of(rows, "v_x").min() > -0.05
     assert of(rows, "v_x").max() < 45.0
@@ -171,26 +156,26 @@ def test_drives_are_drives(programme, vehicle):
     assert np.abs(of(rows, "offset")).max() < 5.0
     assert np.abs(wheels(rows, "slip")[:, of(rows, "v_x") > 3.0]).max() < 0.08
     driven = wheels(rows, "torque").max(axis=1) > 30.0
-    assert {w for w, d in zip(WHEELS, driven, strict=True) if d} == set(CARS[vehicle].driven)
+    assert {w for w, d in zip(WHEELS, driven, strict=True) if d} == set(cases.CARS[vehicle].driven)
 
 
-@pytest.mark.parametrize("effect", POOLS)
+@pytest.mark.parametrize("effect", cases.POOLS)
 def test_no_size_no_effect(effect):
-    spec = Spec(SUITED[effect][0], "white", (POOLS[effect][0],), seed=3, duration_s=40.0, scale=0.0)
-    hidden, nominal = clean_pair(spec)
+    spec = cases.Spec(SUITED[effect][0], "white", (cases.POOLS[effect][0],), seed=3, duration_s=40.0, scale=0.0)
+    hidden, nominal = cases.clean_pair(spec)
     assert hidden.frame.equals(nominal.frame)
 
 
 @pytest.mark.nightly
-@pytest.mark.parametrize("effect", POOLS)
+@pytest.mark.parametrize("effect", cases.POOLS)
 def test_each_size_in_the_pool_is_seen_and_the_weak_ones_less(effect):
     length = {"pressure_loss": 110.0, "drag_patch": 90.0, "hills": 60.0, "speed_hump": 60.0}.get(effect, 30.0)
-    for hidden in POOLS[effect]:
-        spec = Spec(SUITED[effect][0], "white", (hidden,), seed=3, duration_s=length)
+    for hidden in cases.POOLS[effect]:
+        spec = cases.Spec(SUITED[effect][0], "white", (hidden,), seed=3, duration_s=length)
         change = []
-        nominal = clean_drive(spec, implied(spec))
+        nominal = cases.clean_drive(spec, cases.implied(spec))
         for scale in (0.3, 1.0):
-            seen = clean_drive(spec, truth(replace(spec, scale=scale)))
+            seen = cases.clean_drive(spec, cases.truth(replace(spec, scale=scale)))
             changed = 0.0
             for name in seen.symbols:
                 if not name.startswith(("water", "on_")):
@@ -215,7 +200,7 @@ def test_each_size_in_the_pool_is_seen_and_the_weak_ones_less(effect):
     ],
 )
 def test_sensor_effects_touch_their_signals_alone(hidden, touched):
-    seen, nominal = clean_pair(Spec("mixed", "white", hidden, seed=3, duration_s=40.0))
+    seen, nominal = cases.clean_pair(cases.Spec("mixed", "white", hidden, seed=3, duration_s=40.0))
     changed = {n for n in seen.symbols if not np.array_equal(seen.array(n), nominal.array(n))}
     assert changed == touched
 
@@ -262,9 +247,9 @@ def signature(name, signals, vehicle):
 )
 @pytest.mark.parametrize("vehicle", ["sedan_rwd", "compact_fwd", "suv_awd"])
 def test_force_effects_have_their_size(effect, where, values, vehicle):
-    spec = Spec("mixed", "white", hide(effect, where, **values), seed=3, vehicle=vehicle, duration_s=120.0)
-    seen, nominal = clean_pair(spec)
-    car = CARS[vehicle]
+    spec = cases.Spec("mixed", "white", hide(effect, where, **values), seed=3, vehicle=vehicle, duration_s=120.0)
+    seen, nominal = cases.clean_pair(spec)
+    car = cases.CARS[vehicle]
     base = unexplained(nominal, car)
     name, x = next(iter(values.items()))
     size = x - 1.0 if name == "gain" else x
@@ -274,8 +259,10 @@ def test_force_effects_have_their_size(effect, where, values, vehicle):
 
 @pytest.mark.parametrize(("where", "wheel", "other"), [("fl", "fl", "fr"), ("r", "rr", "fl")])
 def test_a_smaller_tyre_turns_faster_and_pulls_alike(where, wheel, other):
-    seen, _ = clean_pair(Spec("motorway", "white", hide("tyre_radius", where, delta=-0.01), seed=3, duration_s=SHORT))
-    car = CARS["sedan_rwd"]
+    seen, _ = cases.clean_pair(
+        cases.Spec("motorway", "white", hide("tyre_radius", where, delta=-0.01), seed=3, duration_s=SHORT)
+    )
+    car = cases.CARS["sedan_rwd"]
     free = seen.array("v_x") / (seen.array(f"omega_{wheel}") * car.r_e(wheel))
     still = seen.array("v_x") / (seen.array(f"omega_{other}") * car.r_e(other))
     slip = 0.004 if wheel[0] == "r" else 8e-4  # of a wheel that drives, of one that rolls
@@ -284,8 +271,8 @@ def test_a_smaller_tyre_turns_faster_and_pulls_alike(where, wheel, other):
 
 
 def test_radius_grows_with_the_square_of_speed():
-    spec = Spec("motorway", "white", hide("tyre_radius_growth", growth=5e-6), seed=3, duration_s=SHORT)
-    seen, nominal = clean_pair(spec)
+    spec = cases.Spec("motorway", "white", hide("tyre_radius_growth", growth=5e-6), seed=3, duration_s=SHORT)
+    seen, nominal = cases.clean_pair(spec)
     radius = [x.array("v_x") / x.array("omega_fl") for x in (seen, nominal)]
     v = seen.array("v_x")
     assert np.mean(radius[0] / radius[1] - 1.0) == pytest.approx(5e-6 * np.mean(v**2), rel=0.05)
@@ -293,8 +280,8 @@ def test_radius_grows_with_the_square_of_speed():
 
 def test_a_tyre_loses_its_air_when_it_is_told_to():
     values = {"radius": 0.01, "slope": 0.1, "start": 20.0, "duration": 10.0}
-    seen, nominal = clean_pair(
-        Spec("motorway", "white", hide("pressure_loss", "fr", **values), seed=3, duration_s=SHORT)
+    seen, nominal = cases.clean_pair(
+        cases.Spec("motorway", "white", hide("pressure_loss", "fr", **values), seed=3, duration_s=SHORT)
     )
     ratio = seen.array("omega_fr") / nominal.array("omega_fr")
     ratio *= nominal.array("v_x") / seen.array("v_x")
@@ -304,7 +291,9 @@ def test_a_tyre_loses_its_air_when_it_is_told_to():
 
 @pytest.mark.parametrize(("where", "soft", "stiff"), [("rl", "rl", "rr"), ("r", "rr", "fl"), (None, "rl", None)])
 def test_slip_slope_changes_where_it_should(where, soft, stiff):
-    spec = Spec("mixed", "white", hide("slip_stiffness", where, gain=0.7), seed=3, vehicle="suv_awd", duration_s=SHORT)
+    spec = cases.Spec(
+        "mixed", "white", hide("slip_stiffness", where, gain=0.7), seed=3, vehicle="suv_awd", duration_s=SHORT
+    )
     rows, nominal = rows_of(spec), rows_of(replace(spec, hidden=()))
 
     def slope(x, w):
@@ -318,7 +307,7 @@ def test_slip_slope_changes_where_it_should(where, soft, stiff):
 
 
 def test_slope_drifts_and_follows_the_load():
-    spec = Spec(
+    spec = cases.Spec(
         "handling", "white", hide("slip_stiffness_drift", rate=-2e-3), seed=3, vehicle="suv_awd", duration_s=120.0
     )
     rows = rows_of(spec)
@@ -340,11 +329,11 @@ def test_slope_drifts_and_follows_the_load():
 
 
 def test_forces_build_up_over_the_relaxation_length():
-    spec = Spec("stop_and_go", "white", hide("relaxation_length", length=1.0), seed=3, duration_s=SHORT)
+    spec = cases.Spec("stop_and_go", "white", hide("relaxation_length", length=1.0), seed=3, duration_s=SHORT)
     rows, nominal = rows_of(spec), rows_of(replace(spec, hidden=()))
 
     def lag(x):
-        kinematic = of(x, "omega_rl") * CARS["sedan_rwd"].r_e_r
+        kinematic = of(x, "omega_rl") * cases.CARS["sedan_rwd"].r_e_r
         direct = (kinematic - of(x, "v_x") + 0.5 * 1.55 * of(x, "yaw_rate")) / np.maximum(kinematic, 1.0)
         return np.std(direct - of(x, "slip_rl"))
 
@@ -353,18 +342,20 @@ def test_forces_build_up_over_the_relaxation_length():
 
 
 def test_delay_is_late_by_its_size():
-    seen, nominal = clean_pair(
-        Spec("handling", "white", hide("signal_delay", "a_x", delay=0.08), seed=3, duration_s=SHORT)
+    seen, nominal = cases.clean_pair(
+        cases.Spec("handling", "white", hide("signal_delay", "a_x", delay=0.08), seed=3, duration_s=SHORT)
     )
     assert np.allclose(seen.array("a_x")[100:], nominal.array("a_x")[92:-8], atol=1e-9)
-    skewed, _ = clean_pair(Spec("handling", "white", hide("clock_skew", "v_x", skew=5000.0), seed=3, duration_s=SHORT))
+    skewed, _ = cases.clean_pair(
+        cases.Spec("handling", "white", hide("clock_skew", "v_x", skew=5000.0), seed=3, duration_s=SHORT)
+    )
     x, y, t = skewed.array("v_x"), nominal.array("v_x"), nominal.array("t")
     assert np.allclose(np.interp(t / 1.005, t, y), x, atol=2e-3)
 
 
 def test_a_trailer_is_pulled_but_not_carried():
-    spec = Spec("mixed", "white", hide("trailer", mass=500.0, delta_drag_area=0.0), seed=3, duration_s=SHORT)
-    rows, car = rows_of(spec), CARS["sedan_rwd"]
+    spec = cases.Spec("mixed", "white", hide("trailer", mass=500.0, delta_drag_area=0.0), seed=3, duration_s=SHORT)
+    rows, car = rows_of(spec), cases.CARS["sedan_rwd"]
     assert np.allclose(wheels(rows, "F_z").sum(axis=0), car.mass * G, rtol=1e-9)
     pulled = wheels(rows, "F_x").sum(axis=0) - 0.5 * car.air_density * car.drag_area * of(rows, "v_x") ** 2
     total = (pulled - 500.0 * G * car.rolling_resistance) / (car.mass + 500.0)
@@ -372,22 +363,24 @@ def test_a_trailer_is_pulled_but_not_carried():
 
 
 def test_load_sits_where_it_is_put():
-    spec = Spec("motorway", "white", hide("payload_mass", "r", delta_mass=200.0), seed=3, duration_s=30.0)
+    spec = cases.Spec("motorway", "white", hide("payload_mass", "r", delta_mass=200.0), seed=3, duration_s=30.0)
     more = wheels(rows_of(spec), "F_z").mean(axis=1) - wheels(rows_of(replace(spec, hidden=())), "F_z").mean(axis=1)
     assert np.allclose(more[:2].sum(), 0.0, atol=25.0)
     assert more[2:].sum() == pytest.approx(200.0 * G, abs=25.0)
 
 
 def test_a_grade_is_in_the_speed_but_not_in_the_balance():
-    seen, nominal = clean_pair(Spec("mixed", "white", hide("road_grade", grade=0.02), seed=3, duration_s=SHORT))
+    seen, nominal = cases.clean_pair(
+        cases.Spec("mixed", "white", hide("road_grade", grade=0.02), seed=3, duration_s=SHORT)
+    )
     kinematic = seen.array("a_x") - np.gradient(seen.array("v_x"), 0.01)
     assert np.mean(kinematic) == pytest.approx(G * np.sin(0.02), abs=0.01)
-    car = CARS["sedan_rwd"]
+    car = cases.CARS["sedan_rwd"]
     assert np.nanmean(unexplained(seen, car)) == pytest.approx(np.nanmean(unexplained(nominal, car)), abs=0.003)
 
 
 def test_water_brakes_softens_and_is_cleared():
-    spec = Spec("wet", "white", seed=3, vehicle="suv_awd", duration_s=120.0)
+    spec = cases.Spec("wet", "white", seed=3, vehicle="suv_awd", duration_s=120.0)
     rows = rows_of(spec)
     film, lost = wheels(rows, "film"), wheels(rows, "lost")
     wet = film[1] > 1e-4
@@ -396,9 +389,9 @@ def test_water_brakes_softens_and_is_cleared():
     assert film[3].max() < 0.7e-3
     assert np.median(lost[1][wet]) > 1.4 * np.median(lost[3][film[3] > 1e-4])
     assert np.all(film[0] <= film[1] + 1e-12)
-    signals = make_case(replace(spec, holdout=0)).drives[0][1]
+    signals = cases.make_case(replace(spec, holdout=0)).drives[0][1]
     assert np.mean(np.abs(signals.array("water_depth_right") - film[1]) < 1e-4) > 0.99
-    residual = unexplained(signals, CARS["suv_awd"])
+    residual = unexplained(signals, cases.CARS["suv_awd"])
     assert np.nanmean(residual[wet]) < np.nanmean(residual[~wet]) - 0.05
 
 
@@ -406,10 +399,10 @@ def test_water_brakes_softens_and_is_cleared():
 @pytest.mark.parametrize("effect", ["speed_hump", "drag_patch", "gear_loss", "accelerometer_speed"])
 @pytest.mark.parametrize("vehicle", ["compact_fwd", "suv_awd"])
 def test_functions_of_the_unknown_are_what_the_drive_holds(effect, vehicle):
-    hidden = POOLS[effect][0]
-    spec = Spec(SUITED[effect][0], "white", (hidden,), seed=3, vehicle=vehicle, duration_s=200.0)
-    rows, car = rows_of(spec), CARS[vehicle]
-    seen, nominal = clean_pair(spec)
+    hidden = cases.POOLS[effect][0]
+    spec = cases.Spec(SUITED[effect][0], "white", (hidden,), seed=3, vehicle=vehicle, duration_s=200.0)
+    rows, car = rows_of(spec), cases.CARS[vehicle]
+    seen, nominal = cases.clean_pair(spec)
     shape = shape_of(hidden, car)
     coordinates = {
         "v_x": seen.array("v_x"), "a_x": of(rows, "a_x"), "position": of(rows, "position"),
@@ -423,10 +416,10 @@ def test_functions_of_the_unknown_are_what_the_drive_holds(effect, vehicle):
 
 
 def test_the_driver_reacts_to_what_is_hidden():
-    spec = Spec("motorway", "white", hide("head_wind", speed=8.0), seed=3, duration_s=120.0)
+    spec = cases.Spec("motorway", "white", hide("head_wind", speed=8.0), seed=3, duration_s=120.0)
     rows, nominal = rows_of(spec), rows_of(replace(spec, hidden=()))
     late = slice(4000, None)
-    car = CARS["sedan_rwd"]
+    car = cases.CARS["sedan_rwd"]
     v = of(nominal, "v_x")[late]
     needed = 0.5 * car.air_density * car.drag_area * np.mean((v + 8.0) ** 2 - v**2) * car.r_e_r
     more = wheels(rows, "torque").sum(axis=0)[late].mean() - wheels(nominal, "torque").sum(axis=0)[late].mean()
@@ -437,23 +430,23 @@ def test_the_driver_reacts_to_what_is_hidden():
     assert abs(of(rows, "v_x") - of(nominal, "v_x"))[:2000].max() > 0.3
 
 
-@pytest.mark.parametrize("kind", NOISES)
+@pytest.mark.parametrize("kind", cases.NOISES)
 def test_accelerometer_noise_has_its_size(kind):
-    spec = Spec("mixed", kind, seed=3, duration_s=120.0)
+    spec = cases.Spec("mixed", kind, seed=3, duration_s=120.0)
     world, rows = cases.world_of(spec), rows_of(replace(spec, noise="white"))
     x = measure(rows, world, kind, 3)["a_x"] - measure(rows, world, None, 3)["a_x"]
     assert np.nanstd(x) == pytest.approx(0.05, rel=0.6 if kind in ("ou5", "pink", "student") else 0.1)
 
 
 def test_gaps_are_null_and_the_rest_stays():
-    frame = make_case(Spec("mixed", "gaps", seed=3, holdout=0, duration_s=150.0)).drives[0][1].frame
+    frame = cases.make_case(cases.Spec("mixed", "gaps", seed=3, holdout=0, duration_s=150.0)).drives[0][1].frame
     missing = np.array(
         [frame[c].null_count() / frame.height for c in frame.columns if c.startswith(("a_", "omega", "v_"))]
     )
     assert 0.003 < missing.mean() < 0.12
     assert frame["t"].null_count() == 0
     assert (
-        make_case(Spec("mixed", "white", seed=3, holdout=0, duration_s=20.0))
+        cases.make_case(cases.Spec("mixed", "white", seed=3, holdout=0, duration_s=20.0))
         .drives[0][1]
         .frame.null_count()
         .to_numpy()
@@ -463,20 +456,24 @@ def test_gaps_are_null_and_the_rest_stays():
 
 
 def test_a_case_is_a_function_of_its_spec():
-    spec = Spec("mixed", "student", (POOLS["payload_mass"][0],), seed=5, duration_s=30.0, drives=2, holdout=1)
-    one, two = make_case(spec), make_case(pickle.loads(pickle.dumps(spec)))
+    spec = cases.Spec(
+        "mixed", "student", (cases.POOLS["payload_mass"][0],), seed=5, duration_s=30.0, drives=2, holdout=1
+    )
+    one, two = cases.make_case(spec), cases.make_case(pickle.loads(pickle.dumps(spec)))
     assert hash(spec) == hash(pickle.loads(pickle.dumps(spec)))
     frames = [s.frame for _, s in (*one.drives, *one.holdout)]
     assert all(a.equals(b.frame) for a, (_, b) in zip(frames, (*two.drives, *two.holdout), strict=True))
     assert not frames[0].equals(frames[1])
     assert not frames[0].equals(frames[2])
-    assert not frames[0].equals(make_case(replace(spec, seed=6)).drives[0][1].frame)
+    assert not frames[0].equals(cases.make_case(replace(spec, seed=6)).drives[0][1].frame)
     assert [n for n, _ in one.drives] == ["drive_1", "drive_2"]
     assert [n for n, _ in one.holdout] == ["unseen_1"]
 
 
 def test_speed_may_be_withheld():
-    signals = make_case(Spec("mixed", "white", seed=5, duration_s=10.0, holdout=0, has_v_x=False)).drives[0][1]
+    signals = cases.make_case(cases.Spec("mixed", "white", seed=5, duration_s=10.0, holdout=0, has_v_x=False)).drives[
+        0
+    ][1]
     assert "v_x" not in signals.symbols
     assert {"a_x", "a_y", "yaw_rate", "steer_angle", "omega_rr", "torque_fl", "on_water"} <= set(signals.symbols)
 
@@ -484,9 +481,9 @@ def test_speed_may_be_withheld():
 def test_names_are_those_of_the_library():
     from aqualog.model.effects import EFFECTS
 
-    known = set(POOLS) - set(UNKNOWN)
+    known = set(cases.POOLS) - set(cases.UNKNOWN)
     assert known == set(EFFECTS)
-    for hidden in (h for pool in POOLS.values() for h in pool if h.in_library):
+    for hidden in (h for pool in cases.POOLS.values() for h in pool if h.in_library):
         effect = EFFECTS[hidden.effect]
         by_name = {p.name: p for p in effect.parameters}
         assert hidden.where is None or hidden.where in effect.places, hidden.key
@@ -498,11 +495,11 @@ def test_names_are_those_of_the_library():
 def test_specs_cover_noises_programmes_and_cars():
     nulls = list(cases.null_specs(range(1, 4)))
     assert len(nulls) == 3 * 4 * 10
-    assert {s.vehicle for s in nulls} == set(CARS)
+    assert {s.vehicle for s in nulls} == set(cases.CARS)
     assert all(not cases.truth(s) for s in nulls)
-    assert cases.truth(Spec("hilly", "white"))[0].effect == "hills"
+    assert cases.truth(cases.Spec("hilly", "white"))[0].effect == "hills"
     hidden = list(cases.hidden_specs(range(1, 3), scale=0.3))
-    assert len(hidden) == 2 * len(POOLS)
+    assert len(hidden) == 2 * len(cases.POOLS)
     assert all(s.programme in SUITED[s.hidden[0].effect] for s in hidden)
 
 
@@ -511,7 +508,7 @@ def test_written_cases_are_read_back(tmp_path, suffix):
     from aqualog.align.load import load_signals
     from aqualog.config.vehicle import load_vehicle
 
-    case = make_case(Spec("wet", "gaps", seed=5, duration_s=20.0, vehicle="suv_awd"))
+    case = cases.make_case(cases.Spec("wet", "gaps", seed=5, duration_s=20.0, vehicle="suv_awd"))
     paths = cases.write_case(case, tmp_path, suffix=suffix)
     vehicle = load_vehicle(paths["vehicle"][0])
     assert replace(vehicle, given=frozenset(), torque_split_rear=0.6) == replace(case.vehicle, given=frozenset())
@@ -527,9 +524,9 @@ def test_written_cases_are_read_back(tmp_path, suffix):
 def test_wrong_words_are_told():
     for wrong in ({"programme": "fast"}, {"noise": "loud"}, {"vehicle": "tank"}, {"tyre": "square"}):
         with pytest.raises(KeyError, match="there are"):
-            Spec(**({"programme": "mixed", "noise": "white"} | wrong))
+            cases.Spec(**({"programme": "mixed", "noise": "white"} | wrong))
     with pytest.raises(KeyError, match="no hidden effect"):
-        Hidden("gravity", None, {})
+        cases.Hidden("gravity", None, {})
 
 
 def test_the_world_shares_no_physics_with_the_library():

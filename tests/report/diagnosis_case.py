@@ -5,23 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aqualog.diagnose.records import (
-    Agreement,
-    Alternative,
-    ByDrive,
-    Cause,
-    ChannelGain,
-    Confusion,
-    Consequence,
-    Diagnosis,
-    Estimate,
-    Gain,
-    Limit,
-    Manoeuvre,
-    Remainder,
-    ResidualView,
-    Significance,
-)  # fmt: skip
+from aqualog.diagnose import records
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 
@@ -40,73 +24,77 @@ SCALES = {
     "lateral": 0.1,
 }
 
-MASS = Cause(
-    "payload_mass", None, {"delta_mass": Estimate(262.0, 240.0, 285.0, "kg")}, ("force_balance",),
+MASS = records.Cause(
+    "payload_mass", None, {"delta_mass": records.Estimate(262.0, 240.0, 285.0, "kg")}, ("force_balance",),
     "The car weighed 262 kg more than the vehicle file says.",
 )  # fmt: skip
-TORQUE = Cause(
-    "torque_gain", None, {"gain": Estimate(0.8651, 0.8532, 0.8771, "-")}, ("force_balance",),
+TORQUE = records.Cause(
+    "torque_gain", None, {"gain": records.Estimate(0.8651, 0.8532, 0.8771, "-")}, ("force_balance",),
     "The wheels get 0.865 of the torque.",
 )  # fmt: skip
-RADIUS = Cause(
-    "tyre_radius", "fl", {"delta": Estimate(-0.00431, -0.00462, -0.00398, "-")}, ("slip_fl", "side_slip_f"),
+RADIUS = records.Cause(
+    "tyre_radius", "fl", {"delta": records.Estimate(-0.00431, -0.00462, -0.00398, "-")}, ("slip_fl", "side_slip_f"),
     "The tyre has a radius -0.43% off.",
 )  # fmt: skip
-GROWTH = Cause(
-    "tyre_radius_growth", "r", {"growth": Estimate(2.04e-6, 1.7e-6, 2.4e-6, "s^2/m^2")}, ("slip_rl", "slip_rr"), ""
+GROWTH = records.Cause(
+    "tyre_radius_growth",
+    "r",
+    {"growth": records.Estimate(2.04e-6, 1.7e-6, 2.4e-6, "s^2/m^2")},
+    ("slip_rl", "slip_rr"),
+    "",
 )
-FOUND = Significance(213.4, 12.31, 0.01, 0.01, 0.0101, 99)
-NOTHING = Significance(8.12, 12.31, 0.34, 0.01, 0.0101, 99)
+FOUND = records.Significance(213.4, 12.31, 0.01, 0.01, 0.0101, 99)
+NOTHING = records.Significance(8.12, 12.31, 0.34, 0.01, 0.0101, 99)
 LIMITS = (
-    Limit("payload_mass", None, 14.2, "kg"), Limit("torque_gain", None, 0.0123, "-"),
-    Limit("head_wind", None, 1.93, "m/s"), Limit("aero_drag", None, 0.0812, "m^2"), Limit("road_grade", None, NAN, "rad"),
-    Limit("tyre_radius", "fl", 0.00021, "-"), Limit("tyre_radius_growth", "r", 4.1e-7, "s^2/m^2"),
-    Limit("accelerometer_bias", "a_x", 0.006, "m/s^2"), Limit("signal_delay", "v_x", 0.0321, "s"),
-    Limit("clock_skew", "a_x", 1234.0, "ppm"),
+    records.Limit("payload_mass", None, 14.2, "kg"), records.Limit("torque_gain", None, 0.0123, "-"),
+    records.Limit("head_wind", None, 1.93, "m/s"), records.Limit("aero_drag", None, 0.0812, "m^2"), records.Limit("road_grade", None, NAN, "rad"),
+    records.Limit("tyre_radius", "fl", 0.00021, "-"), records.Limit("tyre_radius_growth", "r", 4.1e-7, "s^2/m^2"),
+    records.Limit("accelerometer_bias", "a_x", 0.006, "m/s^2"), records.Limit("signal_delay", "v_x", 0.0321, "s"),
+    records.Limit("clock_skew", "a_x", 1234.0, "ppm"),
 )  # fmt: skip
 RELATION = (
     "An accelerometer bias b is the same as a constant grade of b/g with a rolling resistance that is off by -b/g."
 )
 CONFUSIONS = (
-    Confusion("payload_mass", ("torque_gain",), 0.81, 0.674),
-    Confusion("torque_gain", ("payload_mass",), 1.1, 0.700),
-    Confusion("payload_mass", ("head_wind",), 410.0, 1.0),
-    Confusion("aero_drag", ("head_wind",), 0.21, 0.591),
-    Confusion("tyre_radius@fl", ("payload_mass",), 9000.0, 1.0),
-    Confusion("payload_mass", ("torque_gain", "wheel_inertia"), 0.02, 0.528),
-    Confusion("accelerometer_bias@a_x", ("road_grade", "rolling_resistance"), 0.0, 0.5, RELATION),
-    Confusion("road_grade", ("rolling_resistance",), 301.0, 1.0),
-    Confusion("accelerometer_bias@a_x", ("road_grade",), 14.0, 0.969),
+    records.Confusion("payload_mass", ("torque_gain",), 0.81, 0.674),
+    records.Confusion("torque_gain", ("payload_mass",), 1.1, 0.700),
+    records.Confusion("payload_mass", ("head_wind",), 410.0, 1.0),
+    records.Confusion("aero_drag", ("head_wind",), 0.21, 0.591),
+    records.Confusion("tyre_radius@fl", ("payload_mass",), 9000.0, 1.0),
+    records.Confusion("payload_mass", ("torque_gain", "wheel_inertia"), 0.02, 0.528),
+    records.Confusion("accelerometer_bias@a_x", ("road_grade", "rolling_resistance"), 0.0, 0.5, RELATION),
+    records.Confusion("road_grade", ("rolling_resistance",), 301.0, 1.0),
+    records.Confusion("accelerometer_bias@a_x", ("road_grade",), 14.0, 0.969),
 )
-HILL = Manoeuvre(
+HILL = records.Manoeuvre(
     "speed_staircase", (("payload_mass", "torque_gain"),),
     "Drive a staircase of speeds, 40 to 120 km/h in steps of 20 km/h: drag does not follow the mass.", 0.81, 64.2, 4.5,
 )  # fmt: skip
-GAIN = Gain(
+GAIN = records.Gain(
     (
-        ChannelGain("force_balance", "m/s^2", 0.1182, 0.0451, 0.311, 0.132),
-        ChannelGain("kinematic", "m/s^2", 0.0512, 0.0511),
-        ChannelGain("slip_rl", "-", 0.00213, 0.00209, 0.0031, 0.0032),
-        ChannelGain("tie_rod_fl", "N", 21.3, 21.3),
+        records.ChannelGain("force_balance", "m/s^2", 0.1182, 0.0451, 0.311, 0.132),
+        records.ChannelGain("kinematic", "m/s^2", 0.0512, 0.0511),
+        records.ChannelGain("slip_rl", "-", 0.00213, 0.00209, 0.0031, 0.0032),
+        records.ChannelGain("tie_rod_fl", "N", 21.3, 21.3),
     ),
     812.4, 700.2, 930.1, ("autumn.mf4", IMAGE), False,
     (
-        Consequence("resistance", 12, 1, 84.2, 0.421, 0.402, 38, 38, 40),
-        Consequence("joint_cusum", 0, 0, 84.2, None, None, 40, 40, 40),
+        records.Consequence("resistance", 12, 1, 84.2, 0.421, 0.402, 38, 38, 40),
+        records.Consequence("joint_cusum", 0, 0, 84.2, None, None, 40, 40, 40),
     ),
     ("The intervals treat a drive as the unit.",), 790.0,
 )  # fmt: skip
-AGREED = Agreement(
+AGREED = records.Agreement(
     "payload_mass", "delta_mass",
     (
-        ByDrive("b24.mf4", Estimate(268.1, 243.2, 293.0, "kg"), 255.3, 31.2),
-        ByDrive(HOSTILE, Estimate(255.3, 228.9, 281.7, "kg"), 268.1, -0.72),
+        records.ByDrive("b24.mf4", records.Estimate(268.1, 243.2, 293.0, "kg"), 255.3, 31.2),
+        records.ByDrive(HOSTILE, records.Estimate(255.3, 228.9, 281.7, "kg"), 268.1, -0.72),
     ),
     0.482,
 )  # fmt: skip
-BASE = Diagnosis(
+BASE = records.Diagnosis(
     verdict="named", sentence=MASS.sentence, drives=("b24.mf4", HOSTILE), duration_s=1265.0, used_s=1103.4,
-    causes=(MASS,), alternatives=(Alternative((RADIUS, GROWTH), 14.3),), significance=FOUND, limits=LIMITS,
+    causes=(MASS,), alternatives=(records.Alternative((RADIUS, GROWTH), 14.3),), significance=FOUND, limits=LIMITS,
     confusions=CONFUSIONS, remainders=(), manoeuvre=None, gain=GAIN,
     model=Model((Term(EFFECTS["payload_mass"], {"delta_mass": 262.0}),)), channels=CHANNELS,
     untested={"relaxation_length": "needs torque above 2 Hz", "water_drag": "no water on these drives <b>"},
@@ -117,7 +105,7 @@ BASE = Diagnosis(
 def remainder():
     v = np.linspace(15.0, 35.0, 40)
     f = 0.08 * np.exp(-(((v - 26.0) / 3.0) ** 2))
-    return Remainder(
+    return records.Remainder(
         "force_balance", ("v_x",), 0.412, 0.0099, v[:, None], f, f - 0.011, f + 0.011, ("torque",), "aero_drag", 0.431,
         "Between 20 and 31 m/s the car is slowed more than the model says, by up to 0.08 m/s^2.",
     )  # fmt: skip
@@ -127,7 +115,7 @@ def surface():
     v, h = (x.ravel() for x in np.meshgrid(np.linspace(15.0, 35.0, 12), np.linspace(0.0, 0.002, 9)))
     f = 20.0 * h * (v / 30.0) ** 2
     f[3] = NAN
-    return Remainder(
+    return records.Remainder(
         "kinematic", ("v_x", "water_depth"), 0.2, NAN, np.column_stack([v, h]), f, f - 0.01, f + 0.01, (), None, NAN, ""
     )
 
@@ -144,7 +132,7 @@ def view(drive, channel, *, seed=1, gain=1.0, changed=True, n=6000):
     after = noise.copy()
     after[700:900] = NAN
     title = {"force_balance": "Force balance", "kinematic": "Acceleration against wheel speeds"}.get(channel, channel)
-    return ResidualView(
+    return records.ResidualView(
         drive, channel, title, UNITS[channel], 0.1,
         {"t": t, "v_x": v, "torque": 1600.0 * 0.31 * a_x + 90.0, "position": np.cumsum(v) * 0.1, "a_x": a_x},
         before, after if changed else before.copy(),

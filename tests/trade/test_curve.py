@@ -113,6 +113,17 @@ def passes(shift=0.0, spread=0.0, speeds=(60, 65, 70, 75, 80, 85)):
     return found
 
 
+def test_the_greatest_lies_between_steps():
+    made = []
+    for kmh in (55.0, 60.0, 65.0, 70.0, 75.0):
+        for k in (-0.02, 0.0, 0.02):
+            mean = 3.0 - 0.01 * (kmh - 66.3) ** 2 + k
+            made.append(CurvePass(kmh * KMH, 2.0 + 0.04 * kmh, mean - 0.5, mean, 100.0))
+    top, (low, high) = curve_set(made, LIMITS, result="mean", between=(60 * KMH, 70 * KMH)).v_greatest
+    assert top / KMH == pytest.approx(66.3, abs=0.01)
+    assert low < top < high
+
+
 def test_set_by_hand():
     made = curve_set(passes(), LIMITS, result="mean", between=(60 * KMH, 80 * KMH))
     assert made.valid == made.passes == 18
