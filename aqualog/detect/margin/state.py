@@ -72,7 +72,7 @@ class FilterParams(NamedTuple):
     law_R: float = 1.0  # [-] by which the laws of resistance may differ beyond what was drawn
     law_M: float = 2.0  # [-] the same of the log variances
     calm: float = 0.3  # [-] of water so even, or of wheels that a control holds so still, that none shakes (K)
-    calm_road: float = 0.1  # [-] the same among wet roads: water far from full aquaplaning shakes none anyway
+    calm_road: float = 0.05  # [-] the same among wet roads: water far from full aquaplaning shakes none anyway
     vague: float = 9.0  # variance of a slip that says nothing: thrice the scale
     keep_s: float = 0.8  # [s] memory of the evidence on the full speed
     most_u: float = 2.8  # [-] asinh of the traction over 0.02: beyond, no drive on snow was learnt from
