@@ -33,12 +33,8 @@ class Mechanism:
     allowed: float
     over: tuple[tuple[str, ...], ...]
     is_road: bool = False  # every road has it: no unknown form
+    is_fast: bool = False  # it multiplies a fast signal: over time and place a smooth function is more than slow noise
     scales: str = ""
-
-    @property
-    def may_drift(self) -> bool:
-        """Whether a smooth function of time or place is more than slow noise."""
-        return self.is_road or self.name in ("torque", "accelerometer_gain", "slip_f", "slip_r")
 
 
 ALONG = ("t", "position")
@@ -54,14 +50,14 @@ MECHANISMS: tuple[Mechanism, ...] = (
     ),
     Mechanism(
         "accelerometer_gain", "the gain of the accelerometer", "accelerometer_gain@a_x", "-", 0.05, 0.01,
-        _SENSOR, scales="a_x",
+        _SENSOR, is_fast=True, scales="a_x",
     ),
     Mechanism(
         "torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.01,
-        (("torque",), ("v_x",), ("t",)),
+        (("torque",), ("v_x",), ("t",)), is_fast=True,
     ),
-    Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.07, _SLIP),
-    Mechanism("slip_r", "the slip slope of the rear axle", "slip_stiffness@r", "-", 0.3, 0.07, _SLIP),
+    Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.07, _SLIP, is_fast=True),
+    Mechanism("slip_r", "the slip slope of the rear axle", "slip_stiffness@r", "-", 0.3, 0.07, _SLIP, is_fast=True),
     Mechanism(
         "radius_f", "the radius of the front wheels", "tyre_radius@f", "-", 0.005, 0.0007,
         (("v_x",), ("t",), ("torque",)),
@@ -111,9 +107,9 @@ def shapes(coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, ha
         if m.source not in has:
             continue
         for names in m.over:
-            # over time and place a smooth function is no other than slow noise, unless it multiplies what is fast:
-            # see `elements`
-            if not all(n in coordinates for n in names) or (not m.may_drift and set(names) & set(ALONG)):
+            # else a smooth function over time and place is no other than slow noise: see `elements`
+            may_drift = m.is_road or m.is_fast
+            if not all(n in coordinates for n in names) or (not may_drift and set(names) & set(ALONG)):
                 continue
             if names not in made:
                 made[names] = basis(names, [coordinates[n] for n in names], mask, dt)
