@@ -14,6 +14,7 @@ from aqualog.diagnose.arena import Arena, products
 from aqualog.diagnose.competition import COARSE, Block, State, joined, placed
 from aqualog.diagnose.evidence import Evidence, forgiving
 from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, first_of, fitted_in, ranked, searched
+from aqualog.diagnose.shapes import ALONG
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
 from aqualog.diagnose.threads import beside
@@ -106,7 +107,10 @@ def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -
 
 def _first(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
     """A set, and the set with each of the blocks that gain most beside it."""
-    return [best, *((*best, m) for m in first_of(arena.blocks, inner, arena.name, best))]
+    along = [
+        i for i, b in enumerate(arena.blocks) if b.kind == "shape" and set(arena.shapes[b.tag].coordinates) & set(ALONG)
+    ]
+    return [best, *((*best, m) for m in first_of(arena.blocks, inner, arena.name, best, along))]
 
 
 def begin(arena: Arena) -> Begun:

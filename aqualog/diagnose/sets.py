@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ __all__ = [
 WIDTH = 8
 MOST = 4  # blocks in one set
 SWAPPED = 3  # sets in which every member is exchanged
-FEW_KNOWN, FEW = 3, 4  # first candidates of known effects and of shapes
+FEW_KNOWN, FEW, FEW_ALONG = 3, 4, 2  # first candidates: known effects, shapes, shapes over time and place
 DIES = 6.0  # [nats] behind the best set, at which a level of larger sets ends the search
 SINGULAR = 1e-3  # share of a column's energy that the others of its set must leave
 SMALLEST = 1e-12
@@ -92,21 +92,21 @@ def shares(evidence: Sequence[float]) -> FloatArray:
 
 
 def first_of(
-    blocks: Sequence[Block], inner: FloatArray, name: Callable[[int], str], beside: Members = ()
+    blocks: Sequence[Block], inner: FloatArray, name: Callable[[int], str], beside: Members = (),
+    along: Collection[int] = (),
 ) -> list[int]:  # fmt: skip
-    """The few known effects, each at its best place, the few shapes, no more than two of a mechanism, and the road that
-    gain most beside a set."""
+    """The few known effects, each at its best place, the few shapes and the road that gain most beside a set. `along`:
+    shapes over time and place, which have places of their own: where noise is slow they would take all others."""
     gains = _gains(joined(inner, blocks, beside), blocks, packed(blocks), inner)
     order = [i for i in np.argsort(-gains, kind="stable").tolist() if i not in beside and gains[i] > 0.0]
-    by_name: dict[tuple[str, str], list[int]] = {}
+    known: dict[str, int] = {}
     for i in order:
-        by_name.setdefault((blocks[i].kind, name(i)), []).append(i)
-
-    def first(kind: str, each: int, most: int) -> list[int]:
-        chosen = {i for (k, _), own in by_name.items() if k == kind for i in own[:each]}
-        return [i for i in order if i in chosen][:most]
-
-    return [*first("effect", 1, FEW_KNOWN), *first("shape", 2, FEW), *first("road", 1, 1)]
+        if blocks[i].kind == "effect":
+            known.setdefault(name(i), i)
+    shapes = [i for i in order if blocks[i].kind == "shape"]
+    late, others = ([i for i in shapes if (i in along) is over] for over in (True, False))
+    roads = [i for i in order if blocks[i].kind == "road"]
+    return [*list(known.values())[:FEW_KNOWN], *late[:FEW_ALONG], *others[:FEW], *roads[:1]]
 
 
 def searched(

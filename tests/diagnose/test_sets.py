@@ -47,12 +47,14 @@ def test_first_candidates_are_different_effects():
     assert first_of(BLOCKS, G, lambda i: str(i), (0,)) == [1, 2, 3]
 
 
-def test_first_candidates_are_shapes_of_several_mechanisms_and_the_road():
+def test_first_candidates_are_shapes_over_time_others_and_the_road():
     right = 400.0 * np.linspace(1.0, 0.2, 9)[:, None]
     G = np.block([[400.0 * np.eye(9), right], [right.T, 1e4]])
     kinds = ["road", "road", "shape", "shape", "shape", "shape", "shape", "shape", "effect"]
     blocks = [block(i, (i,), kind) for i, kind in enumerate(kinds)]
-    assert first_of(blocks, G, lambda i: "road" if i < 2 else "ab"[i > 4]) == [8, 2, 3, 5, 6, 0]
+    assert first_of(blocks, G, lambda i: str(i)) == [8, 2, 3, 4, 5, 0]
+    # what is over time leaves places for the others
+    assert first_of(blocks, G, lambda i: str(i), along={2, 3, 5}) == [8, 2, 3, 4, 6, 7, 0]
 
 
 def test_a_block_that_may_not_join_does_not():
