@@ -87,7 +87,7 @@ def test_the_limit_has_the_power_it_says():
     assert (found**2 > THRESHOLD).mean() == pytest.approx(0.9, abs=0.01)
 
 
-@pytest.mark.parametrize("of_file", [0.0, 0.05, 0.3])
+@pytest.mark.parametrize("of_file", [0.0, 0.05, 0.5, 1.0])
 def test_at_the_limit_an_effect_is_as_likely_as_none(of_file):
     b = scaled(by=0.2)
     i = AT["head_wind"]
@@ -99,7 +99,7 @@ def test_at_the_limit_an_effect_is_as_likely_as_none(of_file):
     inner = COARSE * plain(b)
     inner[:, -1] = inner[-1] = size * np.append(inner[:-1, c], 0.0)
     gain = scores(forgiving(inner, allowed).gram, packed([block])[0]).gain[0]
-    assert gain + block.log_prior == pytest.approx(0.0, abs=0.5)
+    assert 0.0 <= gain + block.log_prior <= np.log(2.0)  # one of the prior's two scales alone reaches zero
 
 
 def test_what_is_never_seen_has_no_limit():
