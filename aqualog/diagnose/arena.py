@@ -232,11 +232,14 @@ def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, .
         if h.allowed or evidence.barred[i]:
             continue
         c = list(columns)
+        low = evidence.low[c]
+        if h.effect.drive.divides:
+            low = low / (1.0 + low)  # where a straight line from the value of the file reaches a small one
         moments = MOMENTS if h.effect.drive.begins_like and "start" in h.fixed and len(evidence.drives) == 1 else 1
         out.append(
             Block(
                 h.key, "effect", columns, np.eye(len(c)), math.log(KNOWN_PRIOR / places[h.effect.name] / moments), i,
-                evidence.low[c] / evidence.prior[c], evidence.high[c] / evidence.prior[c],
+                low / evidence.prior[c], evidence.high[c] / evidence.prior[c],
             )
         )  # fmt: skip
     n = evidence.count

@@ -52,7 +52,7 @@ OFTEN = 0.01  # share of the driving
 LEAST_S = 20.0  # [s] of usable driving
 BRAKE_PRESSURE = 0.5e5  # [Pa]
 BRAKED = 2.0 * BRAKE_PRESSURE  # [Pa] above what a released brake shows
-HOLDS_BRAKES = 0.7  # share of the braking that a torque with the brakes explains at least; gains err by a fifth (K)
+FRICTION = 0.13  # share of the braking that the pressure explains at most, where the torque holds the brakes (K)
 
 
 def smooth(x: FloatArray, dt: float, over: float) -> FloatArray:
@@ -243,15 +243,21 @@ def road_wheel_angle(
 
 
 def brakes_in_torque(pressure: FloatArray, torque: FloatArray, v: FloatArray, vehicle: Vehicle, dt: float) -> bool:
-    """Whether the torque (4, n) holds the brakes: where they are pressed, it explains most of the deceleration.
+    """Whether the torque (4, n) holds the brakes: beside it, the pressure explains little of the braking.
 
-    A fixed torque cannot decide: an engine drags with 300 N·m and more at the wheels.
+    A fixed torque cannot decide: an engine drags with 300 N·m and more at the wheels, a motor that only helps the
+    brakes with 1500. The torque's gain and the mass may be wrong, so both shares are fitted.
     """
-    braked = (pressure > BRAKED) & (v > V_MIN)
+    moving = v > V_MIN
+    braked = (pressure > BRAKED) & moving
     if braked.sum() < 10:
         return True
     slowed = -(_acceleration(v, dt) + roll_out(v, vehicle)) * vehicle.arm("fl") * vehicle.mass
-    return bool(-np.median(torque.sum(axis=0)[braked]) > max(HOLDS_BRAKES * float(np.median(slowed[braked])), 0.0))
+    pressed = np.where(braked, pressure, 0.0)
+    held, applied = (smooth(smooth(x, dt, SPEED_S), dt, SPEED_S) for x in (-torque.sum(axis=0), pressed))
+    shapes = np.stack([held, applied, np.ones_like(held)])[:, moving]
+    share = np.linalg.lstsq(shapes.T, slowed[moving], rcond=None)[0][1] * float(pressure[braked].mean())
+    return bool(share < FRICTION * float(slowed[braked].mean()))
 
 
 def _acceleration(v: FloatArray, dt: float) -> FloatArray:

@@ -110,7 +110,8 @@ def diagnose(
     quiet = evidence.residuals if chosen is None else chosen.residuals
     noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, ready, strict=True)]
     if road is not None:
-        outcome = _with_road(outcome, road)
+        named_too = _extended(outcome, chosen, (), bare, evidence.asked)
+        outcome = _with_road(outcome, _beside_causes(ready[0], named_too) or road)
     is_named = any(c.effect == "road_grade" and "grade_rms" in c.parameters for c in outcome.causes)
     extended = _extended(outcome, chosen, found.forms, model if is_named else bare, evidence.asked)
     names = {d.name for d in ready}
@@ -232,20 +233,29 @@ def _at_likeliest(
 
 
 def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str]) -> Outcome[Option]:
-    """The outcome, without a name of car or tyre where held-out drives gain too little of what it promises them.
+    """The outcome, without a name where the simulation with it is worse on the diagnosed drives, and without one of
+    car or tyre where held-out drives gain too little of what it promises them.
 
     A load, a wind or a road may be the diagnosed drive's alone; `rings` are certain without other drives.
     """
-    predicts = gained is None or gained.in_sample or gained.log_score > KEPT * gained.promised
-    stays = all(EFFECTS[c.effect].belongs in ("car", "tyre") for c in outcome.causes)
-    if predicts or not stays or outcome.verdict not in ("named", "compound"):
+    if gained is None or outcome.verdict not in ("named", "compound"):
         return outcome
-    note = "Not named: held-out drives are not predicted better with it, or by much less than it promises."
+    stays = gained.in_sample or all(EFFECTS[c.effect].belongs in ("car", "tyre") for c in outcome.causes)
+    if not stays or gained.log_score > (0.0 if gained.in_sample else KEPT * gained.promised):
+        return outcome
+    other = "the drive is" if gained.in_sample else "held-out drives are"
+    note = f"Not named: {other} not predicted better with it, or by much less than it promises."
     return outcome._replace(verdict="cannot_tell", certain=rings, notes=(*outcome.notes, note))
 
 
 def _led(drive: Drive, model: Model) -> FloatArray:
     return residual(led_by(drive, model), model)
+
+
+def _beside_causes(drive: Drive, model: Model) -> Profile | None:
+    """The road in what a model without it leaves: a force that has a name is no slope."""
+    led = led_by(drive, model)
+    return find_profile(led, residual(led, model))
 
 
 def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:

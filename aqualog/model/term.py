@@ -77,7 +77,8 @@ class DriveSearch:
 
     `turns`: the sign changes on the way back; `is_shift`: it moves signals in time; `is_relative`: at all its places
     together it changes nothing; `is_single`: it counts once per car, wherever it acts; `is_quick`: it acts within
-    10 ms, so that only short steps show it. `doubt`: share by which another law of the tyre may respond.
+    10 ms, so that only short steps show it; `divides`: it acts as one over its value, so a straight line overshoots.
+    `doubt`: share by which another law of the tyre may respond.
     """
 
     needs: tuple[Need, ...] = ()
@@ -98,6 +99,7 @@ class DriveSearch:
     is_relative: bool = False
     is_single: bool = False
     is_quick: bool = False
+    divides: bool = False
 
 
 @dataclass(frozen=True, slots=True)

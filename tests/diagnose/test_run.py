@@ -16,6 +16,7 @@ from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
 from aqualog.model.scenario import Steering
 from aqualog.model.term import Model
+from tests.blind.world.cases import CARS, Hidden, Spec, clean_rows, make_case, world_of
 from tests.diagnose.test_drive import CAR, NOISY, changed, plain, signals, term
 
 FEW = ("payload_mass", "accelerometer_bias@a_x", "tyre_radius@fl", "signal_delay@v_x", "road_grade", "head_wind")
@@ -292,6 +293,30 @@ def test_what_a_car_has_must_predict_held_out_drives(hidden, elsewhere, verdict,
     assert d.gain.log_score < 0.1 * d.gain.promised
     assert d.verdict == verdict
     assert any("held-out drives are not predicted better" in n for n in d.notes) == (verdict == "cannot_tell")
+
+
+def test_no_name_where_the_drive_itself_is_predicted_worse(monkeypatch):
+    worse = Model((term("torque_gain", gain=0.3),))
+    monkeypatch.setattr(run, "_at_likeliest", lambda f, e, bare, more: (bare, worse, list(e.residuals)))
+    d = told(term("payload_mass", delta_mass=250.0))
+    assert (d.verdict, d.gain.in_sample) == ("cannot_tell", True)
+    assert any("the drive is not predicted better" in n for n in d.notes)
+
+
+def test_a_force_with_a_name_is_no_slope_of_the_road(monkeypatch):
+    ask(monkeypatch, [f"brake_drag@{at}" for at in ("fl", "fr", "f")])
+    hilly = Spec("hilly", "gusts", (Hidden("brake_drag", "f", {"torque": 60.0}),), 8, "compact_fwd", holdout=0)
+    d = diagnose(make_case(hilly).drives, CARS["compact_fwd"], options=QUICK)
+    assert keys(d) == {"brake_drag@f", "road_grade"}
+    mean, (_, road) = d.causes[1].parameters["grade_mean"], clean_rows(hilly, world_of(hilly))
+    assert mean.low < road.grid[:, 1].mean() < mean.high
+
+
+def test_half_of_the_slip_slope_is_named_though_a_straight_line_leaves_nothing_of_it(monkeypatch):
+    ask(monkeypatch, [f"{e}@{at}" for e in ("slip_stiffness", "slip_stiffness_drift") for at in ("rl", "rr", "r")])
+    d = told(term("slip_stiffness", "r", gain=0.4))
+    assert keys(d) == {"slip_stiffness@r"}
+    assert d.causes[0].parameters["gain"].value == pytest.approx(0.4, abs=0.05)
 
 
 def test_a_late_velocity_is_named_without_one_of_the_wheels(monkeypatch):

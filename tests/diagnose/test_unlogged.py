@@ -55,14 +55,19 @@ def test_climbing_at_speed_is_no_brake():
     assert brakes_unlogged(still, braking, off, car, DT)
 
 
-@pytest.mark.parametrize(("drag", "brakes", "held"), [(330.0, 0.0, False), (330.0, 1.0, True), (0.0, 0.8, True)])
-def test_the_deceleration_says_whether_the_torque_holds_the_brakes(drag, brakes, held):
-    """An engine drags with 330 N·m, which is a third of a gentle braking; a gain may be a fifth off."""
-    v = np.r_[np.full(1000, 30.0), 30.0 - 1.8 * np.arange(1000) * DT]
-    pressed = np.r_[np.zeros(1000), np.full(1000, 4e5)]
-    whole = CAR.mass * (1.8 - roll_out(v, CAR)) * CAR.arm("fl")
-    torque = np.tile(-np.maximum(drag, brakes * whole) / 4.0, (4, 1))
-    assert brakes_in_torque(pressed, torque, v, CAR, DT) == held
+@pytest.mark.parametrize(
+    ("gain", "drag", "motor", "held"),
+    [(1.0, 330.0, 0.0, False), (1.0, 330.0, 1.0, True), (0.8, 330.0, 1.0, True), (1.0, 0.0, 0.75, False)],
+)
+def test_the_pressure_says_whether_the_torque_holds_the_brakes(gain, drag, motor, held):
+    """An engine drags with 330 N·m, a motor slows the car up to a limit while friction does the rest; a gain may be a
+    fifth off."""
+    a = np.repeat([1.0, -0.3, -1.0, 1.5, -0.3, -3.0], 500)
+    v = 15.0 + np.cumsum(a) * DT
+    whole = CAR.mass * (a + roll_out(v, CAR)) * CAR.arm("fl")
+    pressed = np.where(a < -0.5, -a, 0.0) * 3e5
+    torque = np.where(pressed, np.minimum(np.maximum(whole, motor * whole.min()), -drag), whole)
+    assert brakes_in_torque(pressed, np.tile(gain * torque / 4.0, (4, 1)), v, CAR, DT) == held
 
 
 @pytest.mark.parametrize("v", [15.0, 35.0])

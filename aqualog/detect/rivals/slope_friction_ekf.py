@@ -12,7 +12,7 @@ from aqualog.core.compiled import compiled, inlined
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.detect.detector import Detector, Scene, Setup
 from aqualog.detect.rivals.rival import WholeDrive, alarm_bits, needs_slip
-from aqualog.detect.rivals.slope_inputs import PATIENCE, driven_wheels, reference_slope
+from aqualog.detect.rivals.slope_inputs import PATIENCE, contiguous, driven_wheels, reference_slope
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 from aqualog.features.smoothing import gain
 from aqualog.physics.tyre_brush import brush_force, brush_slope
@@ -124,25 +124,13 @@ def scan(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Estimate slope, maximum friction and offset of mu = brush(slip - delta; C, mu_max) over a drive.
 
-    Parameters
-    ----------
-    slip, mu : array (n,)
-        NaN: left out. [-]
-    is_active : bool array (n,)
-        False: left out, everything held.
-    slope, mu_max : float
-        At the start. [-]
-
-    Returns
-    -------
-    slope, mu_max, offset : array (n,)
-        The first two NaN where left out. [-] Small slip does not identify the friction, which then keeps its value.
+    `slip`, `mu` (n,) [-]; NaN, or where `is_active` (n,) is False: left out, everything held. `slope` and `mu_max` at
+    the start. Slope and maximum friction (n,) are NaN where left out. Small slip does not identify the friction.
     """
     lows = np.array([math.log(C_LOW), math.log(MU_LOW), -0.02])
     highs = np.array([math.log(C_HIGH), math.log(MU_HIGH), 0.02])
     result: tuple[FloatArray, FloatArray, FloatArray] = _scan(
-        p, math.log(slope), math.log(mu_max), np.ascontiguousarray(slip, dtype=np.float64),
-        np.ascontiguousarray(mu, dtype=np.float64), np.ascontiguousarray(is_active, dtype=np.bool_), lows, highs,
+        p, math.log(slope), math.log(mu_max), *contiguous(slip, mu, is_active), lows, highs,
     )  # fmt: skip
     return result
 

@@ -18,7 +18,7 @@ from aqualog.features.smoothing import UNSET, derivative, lowpass
 from aqualog.physics.differential import differential_slip
 from aqualog.physics.load import G
 
-__all__ = ["PATIENCE", "Driven", "driven_wheels", "line_tracks", "reference_slope", "velocity_lag"]
+__all__ = ["PATIENCE", "Driven", "contiguous", "driven_wheels", "line_tracks", "reference_slope", "velocity_lag"]
 
 PATIENCE = 1.0  # [s] an alarm outlasts missing estimates by this
 SLIP_LINE = 0.1  # [-] beyond, a line says no more
@@ -35,6 +35,14 @@ LAG_MAX = 0.5  # [s]
 # Integral of the squared jerk at which half of a lag is reported, less of it before: a receiver counts as in time at
 # first. 5 s of accelerations that change by 0.1 m/s³ have it
 LAG_KNOWN = 0.05  # [m^2/s^5]
+
+
+def contiguous(slip: FloatArray, mu: FloatArray, is_active: BoolArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """The inputs (n,) of a compiled scan, as it reads them."""
+    return (
+        np.ascontiguousarray(slip, dtype=np.float64), np.ascontiguousarray(mu, dtype=np.float64),
+        np.ascontiguousarray(is_active, dtype=np.bool_),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from aqualog.detect.cusum import CusumParams
 from aqualog.detect.cusum import step as cusum_step
 from aqualog.detect.detector import Detector, Scene, Setup
 from aqualog.detect.rivals.rival import WholeDrive, needs_slip
-from aqualog.detect.rivals.slope_inputs import line_tracks
+from aqualog.detect.rivals.slope_inputs import contiguous, line_tracks
 from aqualog.detect.slip_slope.ekf import Belief, predict, update
 from aqualog.detect.slip_slope.estimator import K_MAX, K_MIN
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
@@ -66,31 +66,13 @@ def scan_rls(
 ) -> tuple[FloatArray, FloatArray]:
     """Estimate slope and offset of slip = mu / C + delta over a drive.
 
-    Parameters
-    ----------
-    slip, mu : array (n,)
-        NaN: left out. [-]
-    is_active : bool array (n,)
-        False: left out, everything held.
-    slope : float
-        At the start. [-]
-
-    Returns
-    -------
-    slope, offset : array (n,)
-        C_s / F_z within 1 ... 300, NaN where left out; offset of the slip. [-]
+    `slip`, `mu` (n,) [-]; NaN, or where `is_active` (n,) is False: left out, everything held. `slope` at the start.
+    The slope C_s / F_z (n,) is within 1 ... 300, NaN where left out; the offset is that of the slip. [-]
 
     Least squares with a forgetting factor per parameter: slope with 8 s, offset with 60 s.
     """
-    result: tuple[FloatArray, FloatArray] = _rls(p, 1.0 / slope, *_contiguous(slip, mu, is_active))
+    result: tuple[FloatArray, FloatArray] = _rls(p, 1.0 / slope, *contiguous(slip, mu, is_active))
     return result
-
-
-def _contiguous(slip: FloatArray, mu: FloatArray, is_active: BoolArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    return (
-        np.ascontiguousarray(slip, dtype=np.float64), np.ascontiguousarray(mu, dtype=np.float64),
-        np.ascontiguousarray(is_active, dtype=np.bool_),
-    )  # fmt: skip
 
 
 def run_rls(r: Scene, setup: Setup) -> tuple[Track, ...]:
@@ -179,7 +161,7 @@ def scan_kalman(
     """
     start = Belief(1.0 / slope, 1.0, 0.0, p.P_k, 0.0, 0.0, 0.0, 0.0, p.P_delta)
     sums = CusumParams(p.nu, p.h, math.inf, p.dt)
-    result: tuple[FloatArray, FloatArray, FloatArray] = _kalman(p, sums, start, *_contiguous(slip, mu, is_active))
+    result: tuple[FloatArray, FloatArray, FloatArray] = _kalman(p, sums, start, *contiguous(slip, mu, is_active))
     return result
 
 
