@@ -144,7 +144,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         if "steer_angle" in present & set(effect.places):
             untested[f"{effect.name}@steer_angle"] = "no residual compares the steering with the car's turning"
         for where in () if is_sought else asked:
-            room = _room(effect, where, drives[0].vehicle, wheels=wheels)
+            room = room_of(effect, where, drives[0].vehicle, wheels=wheels)
             out += [Hypothesis(effect, where, free, fixed, room) for fixed in effect.drive.variants(length)]
     out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(() if torque else (STAND_IN,)))]
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
@@ -159,7 +159,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     return tuple(out), untested
 
 
-def _room(effect: Effect, where: str | None, car: Vehicle, *, wheels: bool) -> float | None:
+def room_of(effect: Effect, where: str | None, car: Vehicle, *, wheels: bool) -> float | None:
     """Tolerance of the lost contact of a car whose speed of full aquaplaning was fitted to its passes, by the spread of
     that speed, and of what shows in changes of the speed alone."""
     fitted = car.water.get("v_anchor")

@@ -233,18 +233,18 @@ def _at_likeliest(
 
 
 def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str]) -> Outcome[Option]:
-    """The outcome, without a name where the simulation with it is worse on the diagnosed drives, and without one of
-    car or tyre where held-out drives gain too little of what it promises them.
+    """The outcome, without a name where the drives gain too little of what it promises them.
 
-    A load, a wind or a road may be the diagnosed drive's alone; `rings` are certain without other drives.
+    Of held-out drives it must be a name of car or tyre: a load, a wind or a road may be the diagnosed drive's alone.
+    `rings` are certain without other drives.
     """
-    if gained is None or outcome.verdict not in ("named", "compound"):
+    if gained is None or gained.log_score > KEPT * gained.promised:
         return outcome
     stays = gained.in_sample or all(EFFECTS[c.effect].belongs in ("car", "tyre") for c in outcome.causes)
-    if not stays or gained.log_score > (0.0 if gained.in_sample else KEPT * gained.promised):
+    if not stays or outcome.verdict not in ("named", "compound"):
         return outcome
-    other = "the drive is" if gained.in_sample else "held-out drives are"
-    note = f"Not named: {other} not predicted better with it, or by much less than it promises."
+    whose = "the diagnosed drives" if gained.in_sample else "held-out drives"
+    note = f"Not named: {whose} are not predicted better with it, or by much less than it promises."
     return outcome._replace(verdict="cannot_tell", certain=rings, notes=(*outcome.notes, note))
 
 

@@ -15,15 +15,15 @@ from tests.blind.level_world import CAR, CAR_AWD, Hidden, world
 BOTH = ("f", "r")
 CASES = {
     "null": (Hidden(), set(), {}),
-    "contact_loss@f+r": (Hidden(contact=dict.fromkeys(BOTH, 1.5)), {"contact_loss"}, {"contact_loss": 1.5}),
-    "contact_loss@r": (Hidden(contact={"r": 1.6}), {"contact_loss"}, {"contact_loss": 1.6}),
-    "water_drag": (Hidden(drag=dict.fromkeys(BOTH, 1.4)), {"water_drag"}, {"water_drag": 1.4}),
+    "contact_loss@f+r": (Hidden(contact=dict.fromkeys(BOTH, 2.4)), {"contact_loss"}, {"contact_loss": 2.4}),
+    "contact_loss@r": (Hidden(contact={"r": 2.4}), {"contact_loss"}, {"contact_loss": 2.4}),
+    "water_drag": (Hidden(drag=dict.fromkeys(BOTH, 2.4)), {"water_drag"}, {"water_drag": 2.4}),
     "slip_stiffness": (Hidden(stiffness=dict.fromkeys(BOTH, 0.8)), {"slip_stiffness"}, {"slip_stiffness": 0.8}),
     "track_clearing": (Hidden(track=3e-4), {"track_clearing"}, {"track_clearing": 3e-4}),
     "uneven_water": (Hidden(depth={"left": 0.6}), {"uneven_water"}, {"uneven_water": 0.6}),
     "drag+stiffness": (
-        Hidden(drag=dict.fromkeys(BOTH, 1.4), stiffness=dict.fromkeys(BOTH, 0.8)), {"water_drag", "slip_stiffness"},
-        {"water_drag": 1.4, "slip_stiffness": 0.8},
+        Hidden(drag=dict.fromkeys(BOTH, 2.4), stiffness=dict.fromkeys(BOTH, 0.8)), {"water_drag", "slip_stiffness"},
+        {"water_drag": 2.4, "slip_stiffness": 0.8},
     ),
     "hump (in no library)": (Hidden(hump=0.08), None, {}),
 }  # fmt: skip

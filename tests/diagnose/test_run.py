@@ -300,7 +300,7 @@ def test_no_name_where_the_drive_itself_is_predicted_worse(monkeypatch):
     monkeypatch.setattr(run, "_at_likeliest", lambda f, e, bare, more: (bare, worse, list(e.residuals)))
     d = told(term("payload_mass", delta_mass=250.0))
     assert (d.verdict, d.gain.in_sample) == ("cannot_tell", True)
-    assert any("the drive is not predicted better" in n for n in d.notes)
+    assert any("the diagnosed drives are not predicted better" in n for n in d.notes)
 
 
 def test_a_force_with_a_name_is_no_slope_of_the_road(monkeypatch):

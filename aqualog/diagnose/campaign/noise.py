@@ -18,7 +18,7 @@ __all__ = ["Fit", "fit", "inner", "inverse_of", "prior_of"]
 NU = 8.0  # tails as heavy as this cost 4 % of efficiency on normal runs
 ROUNDS = 25
 AGAIN = 4  # from a good start
-DOUBTS = 3  # columns of `passes.doubted`
+DOUBTS = 21  # columns of `passes.doubted`
 _MISSING = 1e9
 
 

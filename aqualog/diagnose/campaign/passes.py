@@ -14,6 +14,9 @@ from aqualog.campaign.results import RunInfo
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.campaign.expect import Driven, Response, respond
+from aqualog.diagnose.hypotheses import Hypothesis, room_of, value_in, with_values
+from aqualog.diagnose.tolerances import LANE_TOLERANCES
+from aqualog.model.effects import EFFECTS
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model
@@ -23,6 +26,10 @@ __all__ = ["RESISTANCE", "Passes", "Told", "doubted", "expected_values", "floats
 RESISTANCE = "resistance"
 LOST_MAX = 0.01  # share of the fluctuation at which a wheel spins; beyond, no steady expectation holds
 STEADY = 0.015  # relative error of the steady expectation against the simulation, measured on runs without effect
+# of the file's depths; lost contact and drag have the tolerance of single drives, a factor of two
+LABEL = 0.15
+ALIKE = 0.05  # relative spread of depths and speeds of all runs, below which a law has no other form there
+PART = 0.25  # of a tolerance, at which its column is computed
 FRICTION = 0.2  # relative: "known to 10 or 20 %"; it also covers the shape of the curve
 CONTACT_MIN = 0.3  # [-] of any wheel; below, the passage to full aquaplaning is not steady
 
@@ -85,16 +92,37 @@ def doubted(passes: Passes, base: Model) -> Passes:
     """The same runs with additional columns, before the free ones, for the uncertainty of the expectation itself.
 
     The steady expectation is accurate to `STEADY`: one share for all slips on water and one for the resistance. The
-    tyre's curve depends on a friction known to `FRICTION`. These errors are the same in all runs, with that prior
-    (`noise.prior_of`), so that more runs do not reduce them.
+    tyre's curve depends on a friction known to `FRICTION`. Lost contact and drag of an axle follow a law that is known
+    as on single drives, or as well as the vehicle file was calibrated; depths are known to `LABEL`. No law has the
+    right form, so that all of these may change with depth and with speed, by what a lane may differ from the others.
+    These errors are the same in all runs, with that prior (`noise.prior_of`), so that more runs do not reduce them.
     """
     expected = expected_values(passes, base)[0]
-    columns = np.zeros((*expected.shape, 3))
-    columns[:, :, 2] = np.nan_to_num(expected_values(passes, base, friction=1.0 + FRICTION)[0] - expected)
-    columns[:, :-1, 0] = np.nan_to_num(STEADY * expected[:, :-1])
-    columns[:, -1, 1] = np.nan_to_num(STEADY * expected[:, -1])
-    columns[:, [n.startswith("dry_") for n in passes.names], 0] = 0.0
-    return replace(passes, nuisances=np.concatenate([columns, passes.nuisances], axis=-1))
+    columns = np.zeros((3, *expected.shape))
+    columns[0, :, :-1] = np.nan_to_num(STEADY * expected[:, :-1])
+    columns[1, :, -1] = np.nan_to_num(STEADY * expected[:, -1])
+    columns[2] = np.nan_to_num(expected_values(passes, base, friction=1.0 + FRICTION)[0] - expected)
+    columns[0, :, [n.startswith("dry_") for n in passes.names]] = 0.0
+    apart = [_standardised(passes.coordinates[n]) for n in ("depth", "v_x")]
+    laws = []
+    for (name, where), lane in LANE_TOLERANCES.items():
+        effect, sd = EFFECTS[name], lane.parameters[0].sigma
+        p = effect.parameters[0]
+        room = room_of(effect, where, passes.told[0].scenario.vehicle, wheels=True)
+        h = Hypothesis(effect, where, (p.name,), room=room)
+        off = with_values(base, [(h, {p.name: value_in(base, h, p.name) + PART * sd})])
+        one = np.nan_to_num(expected_values(passes, off)[0] - expected) / PART
+        shared = LABEL if effect.drive.tolerance is None else h.tolerance(p.name)
+        laws += [one * shared / sd, *(math.sqrt(0.5) * one * x[:, None] for x in apart)]
+    out = np.moveaxis(np.concatenate([columns, laws]), 0, -1)
+    return replace(passes, nuisances=np.concatenate([out, passes.nuisances], axis=-1))
+
+
+def _standardised(x: FloatArray) -> FloatArray:
+    """The logarithm of a coordinate (g,) about its mean, over its deviation; 0 where all runs share it, or unknown."""
+    known = np.log(np.maximum(x, 1e-6))
+    spread = float(np.nanstd(known))
+    return np.nan_to_num((known - np.nanmean(known)) / spread) if spread > ALIKE else np.zeros_like(known)
 
 
 def _responses(passes: Passes, model: Model, friction: float = 1.0) -> Response:
