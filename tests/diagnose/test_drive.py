@@ -158,16 +158,6 @@ def test_radii_are_not_known_where_wheel_speeds_are_those_of_a_control_unit():
     assert prepare(replace(log, origins=kmh), told, "a").vehicle.given == told.given - radii
 
 
-def test_without_torque_the_torque_that_the_model_needs_stands_in():
-    log = changed(plain(), plain().frame.drop([f"torque_{w}" for w in WHEELS]))
-    d = prepare(log, CAR, "a")
-    assert d.untorqued
-    assert "force_balance" not in d.channels
-    needed, driven = d.course.torque.sum(axis=0), sum(plain().array(f"torque_{w}") for w in WHEELS)
-    pulls = driven > 0.0  # what brakes and engine share of the rest is not known
-    assert np.corrcoef(needed[pulls], driven[pulls])[0, 1] > 0.95
-
-
 def test_the_gain_of_the_file_is_in_the_signals_already():
     a, b = (prepare(plain(), replace(CAR, torque_gain=g), "a").course.torque for g in (1.0, 2.0))
     np.testing.assert_array_equal(b, a)

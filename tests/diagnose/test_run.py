@@ -327,6 +327,12 @@ def test_a_late_velocity_is_named_without_one_of_the_wheels(monkeypatch):
     assert any("not all four wheel speeds" in n for n in d.notes)
 
 
+def test_a_radius_is_named_without_a_reference_velocity():
+    d = told(log=noisy(term("tyre_radius", "fl", delta=0.012), drop=["v_x"]))
+    assert keys(d) == {"tyre_radius@fl"}
+    assert d.causes[0].parameters["delta"].value == pytest.approx(0.012, abs=0.002)
+
+
 def test_a_late_yaw_rate_shows_in_the_lateral_motion(monkeypatch):
     ask(monkeypatch, tuple(f"signal_delay@{w}" for w in ("v_x", "a_x", "a_y", "yaw_rate")))
     d = told(log=noisy(term("signal_delay", "yaw_rate", delay=0.08), steering=Steering(0.01, 6.0)))

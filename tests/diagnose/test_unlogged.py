@@ -40,9 +40,13 @@ def test_a_brake_is_left_out_of_a_log_without_torque():
     assert any("only driving and rolling out are used" in n for n in d.notes)
 
 
-def test_a_drive_without_brakes_is_used_without_torque_too():
-    d = prepare(changed(plain(), plain().frame.drop(TORQUES)), CAR, "a")
+def test_without_torque_the_torque_that_the_model_needs_stands_in():
+    log = changed(plain(), plain().frame.drop(TORQUES))
+    d = prepare(log, CAR, "a")
+    assert d.untorqued
+    assert "force_balance" not in d.channels
     assert d.used_s > 85.0
+    np.testing.assert_array_equal(d.course.torque, needed_torque(log.array("v_x"), CAR, log.dt))
 
 
 def test_climbing_at_speed_is_no_brake():
