@@ -177,13 +177,13 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     every_wheel, pressed = torqued and all(f"torque_{w}" in filled for w in WHEELS), filled.get("brake_pressure")
     if pressed is not None and not (every_wheel and brakes_in_torque(pressed, torque, v, vehicle, dt)):
         bad |= pressed > BRAKE_PRESSURE
-        notes.append("braking is left out: its torque is not in the log")
+        notes += ["braking is left out: its torque is not in the log"] if torqued else []
     if not torqued:
-        bad |= np.gradient(speed, dt) > A_MOST
-    if not torqued and "brake_pressure" not in filled:
-        bad |= smooth(np.gradient(speed, dt), dt, SPEED_S) < -roll_out(v, vehicle) - ROLLS_OUT
-        notes.append("no brakes in the log: only driving and rolling out are used")
-    elif torqued and "brake_pressure" not in filled:
+        # a motor slows the car too, and presses no brake
+        slows = smooth(np.gradient(speed, dt), dt, SPEED_S) < -roll_out(v, vehicle) - ROLLS_OUT
+        bad |= slows | (np.gradient(speed, dt) > A_MOST)
+        notes.append("only driving and rolling out are used: the torque that slows the car is not known")
+    elif "brake_pressure" not in filled:
         unlogged = "" if every_wheel else "the torque is that of one axle"
         wet = _widened(floats | (_depth(course) > 0.0), BESIDE_S, dt)
         if every_wheel and brakes_unlogged(torque, v, wet, vehicle, dt):

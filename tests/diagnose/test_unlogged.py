@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
 from aqualog.core.notation import WHEELS
@@ -31,9 +32,10 @@ def test_torque_that_is_needed_meets_resistance_and_acceleration():
     assert not needed_torque(v[::-1], CAR, DT)[:, 200:-200].any()
 
 
-def test_a_brake_is_left_out_of_a_log_without_torque():
-    speed = ((0.0, 30.0), (40.0, 30.0), (44.0, 18.0), (90.0, 18.0))
-    d = prepare(signals(speed=speed, drop=[*TORQUES, "brake_pressure"]), CAR, "a")
+@pytest.mark.parametrize("pressure", [None, 0.0], ids=["not logged", "a motor brakes"])
+def test_what_slows_the_car_is_left_out_of_a_log_without_torque(pressure):
+    log = signals(speed=((0.0, 30.0), (40.0, 30.0), (44.0, 18.0), (90.0, 18.0)), drop=TORQUES)
+    d = prepare(changed(log, log.frame.with_columns(brake_pressure=pl.lit(pressure, pl.Float64))), CAR, "a")
     assert not d.mask[405:435].any()
     assert d.mask[50:380].all()
     assert d.mask[480:880].all()
