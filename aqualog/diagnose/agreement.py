@@ -19,7 +19,7 @@ from aqualog.diagnose.search import Found
 from aqualog.diagnose.words import cause_sentence, listed
 from aqualog.model.effects import EFFECTS
 
-__all__ = ["agreements", "widened"]
+__all__ = ["agreements", "contradicted", "mean_of", "widened"]
 
 
 def agreements(found: Found, r: Refit) -> tuple[Agreement, ...]:
@@ -68,7 +68,7 @@ def widened(cause: Cause, found: Sequence[Agreement]) -> Cause:
         low, high = bounds[a.parameter]
         own = _having(cause, a)
         if own:
-            parameters[a.parameter] = _mean([d.alone for d in own], low, high)
+            parameters[a.parameter] = mean_of([d.alone for d in own], low, high)
             only = f" In {listed([d.drive for d in own])} only."
             continue
         e = parameters[a.parameter]
@@ -81,6 +81,17 @@ def widened(cause: Cause, found: Sequence[Agreement]) -> Cause:
     return replace(cause, parameters=parameters, sentence=sentence + only)
 
 
+def contradicted(causes: Sequence[Cause], found: Sequence[Agreement]) -> bool:
+    """Whether a cause is in some drives and not in others: they differ, and its interval holds no effect."""
+    differ = {a.key for a in found if a.p_value < AGREES}
+    neutral = {(c.effect, p.name): p.neutral for c in causes for p in EFFECTS[c.effect].parameters}
+    return any(
+        c.key in differ
+        and all(e.low <= neutral.get((c.effect, n), math.nan) <= e.high for n, e in c.parameters.items())
+        for c in causes
+    )
+
+
 def _having(cause: Cause, a: Agreement) -> list[ByDrive]:
     """The drives that have an effect of a drive, if others do not; else none."""
     effect = EFFECTS[cause.effect]
@@ -89,7 +100,7 @@ def _having(cause: Cause, a: Agreement) -> list[ByDrive]:
     return own if effect.belongs in ("drive", "moment") and len(own) < len(a.drives) else []
 
 
-def _mean(each: Sequence[Estimate], low: float, high: float) -> Estimate:
+def mean_of(each: Sequence[Estimate], low: float, high: float) -> Estimate:
     """Weighted mean with its interval, within bounds."""
     weight = np.array([(2.0 * Z95 / (e.high - e.low)) ** 2 for e in each])
     value, half = float(np.average([e.value for e in each], weights=weight)), Z95 / math.sqrt(float(weight.sum()))

@@ -15,24 +15,8 @@ from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.units import is_unit, parse_unit
 from aqualog.core.vehicle import Vehicle
+from aqualog.diagnose import inputs
 from aqualog.diagnose.channels import block_means, block_step, centre_line_speeds, channels_of
-from aqualog.diagnose.inputs import (
-    A_MOST,
-    BRAKE_PRESSURE,
-    LEAST_S,
-    SPEED_S,
-    V_MIN,
-    brakes_in_torque,
-    brakes_unlogged,
-    confirmed_torque,
-    lasting,
-    needed_torque,
-    quiet_speed,
-    quiet_torque,
-    road_wheel_angle,
-    roll_out,
-    smooth,
-)
 from aqualog.features.stream import INPUTS, FeatureStream
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import FOLLOW_RATE, Course, follow
@@ -110,10 +94,10 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     unless it is judged there, too (`judges_afloat`).
     """
     present = frozenset(s for s in signals.symbols if _is_measured(signals, s))
-    if signals.frame.height * signals.dt < LEAST_S:
+    if signals.frame.height * signals.dt < inputs.LEAST_S:
         raise SignalError(
-            f"{signals.frame.height * signals.dt:.0f} s of drive", where=name, expected=f"{LEAST_S:.0f} s at the least",
-            hint="a longer drive",
+            f"{signals.frame.height * signals.dt:.0f} s of drive", where=name,
+            expected=f"{inputs.LEAST_S:.0f} s at the least", hint="a longer drive",
         )  # fmt: skip
     if signals.dt * LEAST_RATE_HZ > 1.001:
         raise SignalError(
@@ -148,45 +132,45 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         logged = np.array([filled.get(f"torque_{w}", np.zeros(n)) for w in WHEELS])
         told = [signals.origins[f"torque_{w}"].rate_hz for w in vehicle.driven if f"torque_{w}" in signals.origins]
         moves = filled["a_x"] if "a_x" in filled else np.gradient(v, dt)
-        torque = quiet_torque(logged, dt, min(told, default=None))
-        torque = confirmed_torque(torque, moves, dt, 1.0 / (vehicle.mass * vehicle.r_e("fl")))
+        torque = inputs.quiet_torque(logged, dt, min(told, default=None))
+        torque = inputs.confirmed_torque(torque, moves, dt, 1.0 / (vehicle.mass * vehicle.r_e("fl")))
     else:
-        logged = torque = needed_torque(v, vehicle, dt)
+        logged = torque = inputs.needed_torque(v, vehicle, dt)
         torques = {f"torque_{w}" for w in vehicle.driven}
         lacks = ", ".join(sorted({"a_x", *torques} - present)) if torques & present else "wheel torque"
         notes.append(f"no {lacks} in the log: the torque is the one that the model needs for the measured speed")
-    speed = quiet_speed(v, dt)
+    speed = inputs.quiet_speed(v, dt)
     t = np.arange(n, dtype=np.float64) * dt
-    steer = road_wheel_angle(filled, v, vehicle, dt, most=1.2 * A_Y_MAX)
+    steer = inputs.road_wheel_angle(filled, v, vehicle, dt, most=1.2 * A_Y_MAX)
     measured = Course(
         t, torque, steer, speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels, position=np.cumsum(v) * dt
     )
     course = _without_lag(measured, led := follow(vehicle, measured, Model()))
     floats = floating(filled, v, vehicle, course)
-    bad = gaps | (v < V_MIN)
+    bad = gaps | (v < inputs.V_MIN)
     if not judges_afloat:
         bad |= floats
         if _slides(led, vehicle).any():
             bad |= _slides(follow(vehicle, course, Model()), vehicle)
     if "a_x" in filled:
-        bad |= lasting(np.diff(filled["a_x"], prepend=np.nan) == 0.0, FROZEN_S, dt)
+        bad |= inputs.lasting(np.diff(filled["a_x"], prepend=np.nan) == 0.0, FROZEN_S, dt)
     bad |= np.abs(np.gradient(speed, dt)) > A_X_MAX
     if "yaw_rate" in filled:
         bad |= np.abs(v * filled["yaw_rate"]) > A_Y_MAX
     # friction brakes are at every wheel: the torque of one axle cannot hold them
     every_wheel, pressed = torqued and all(f"torque_{w}" in filled for w in WHEELS), filled.get("brake_pressure")
-    if pressed is not None and not (every_wheel and brakes_in_torque(pressed, torque, v, vehicle, dt)):
-        bad |= pressed > BRAKE_PRESSURE
+    if pressed is not None and not (every_wheel and inputs.brakes_in_torque(pressed, torque, v, vehicle, dt)):
+        bad |= pressed > inputs.BRAKE_PRESSURE
         notes += ["braking is left out: its torque is not in the log"] if torqued else []
     if not torqued:
         # a motor slows the car too, and presses no brake
-        slows = smooth(np.gradient(speed, dt), dt, SPEED_S) < -roll_out(v, vehicle) - ROLLS_OUT
-        bad |= slows | (np.gradient(speed, dt) > A_MOST)
+        slows = inputs.smooth(np.gradient(speed, dt), dt, inputs.SPEED_S) < -inputs.roll_out(v, vehicle) - ROLLS_OUT
+        bad |= slows | (np.gradient(speed, dt) > inputs.A_MOST)
         notes.append("only driving and rolling out are used: the torque that slows the car is not known")
     elif "brake_pressure" not in filled:
         unlogged = "" if every_wheel else "the torque is that of one axle"
         wet = _widened(floats | (_depth(course) > 0.0), BESIDE_S, dt)
-        if every_wheel and brakes_unlogged(torque, v, wet, vehicle, dt):
+        if every_wheel and inputs.brakes_unlogged(torque, v, wet, vehicle, dt):
             unlogged = "the car slows down more than its torque explains"
         if unlogged:
             bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.arm("fl")
@@ -347,12 +331,12 @@ def _coordinates(
         "torque": course.torque.sum(axis=0),
         "position": np.cumsum(v) * dt,
         # without smoothing, most of the change would be noise of the velocity
-        "a_x": np.gradient(smooth(v, dt, SPEED_S), dt),
+        "a_x": np.gradient(inputs.smooth(v, dt, inputs.SPEED_S), dt),
     }
     if course.lanes:
         out["water_depth"] = _depth(course)
     if "yaw_rate" in columns:
-        turning = smooth(columns["yaw_rate"], dt, SPEED_S)
+        turning = inputs.smooth(columns["yaw_rate"], dt, inputs.SPEED_S)
         out |= {"a_y": speed * turning, "yaw_rate": turning}
     slowing = out["a_x"] < BRAKES
     if slowing.any():

@@ -13,7 +13,8 @@ from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
-from aqualog.diagnose.agreement import agreements, widened
+from aqualog.diagnose.agreement import agreements, contradicted, widened
+from aqualog.diagnose.alone import MOST, with_each
 from aqualog.diagnose.any_effect import SURROGATES
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
@@ -88,10 +89,25 @@ def diagnose(
     SignalError
         If no drive can be used.
     """
-    options = options or Options()
-    given = model or Model()
+    options, tell = options or Options(), progress or (lambda _text, _share: None)
+    found = _together(drives, vehicle, model or Model(), holdout, options, tell)
+    names = found.drives if len(found.drives) <= MOST else ()
+    if len(names) < 2 or found.verdict not in ("no_effect", "cannot_tell"):
+        return found
+    own, plain = dict(drives), replace(options, views=False, consequences=False)
+    each = {}
+    for k, name in enumerate(names):
+        tell(f"{name} by itself", 0.9 + 0.1 * k / len(names))
+        each[name] = _together([(name, own[name])], vehicle, model or Model(), (), plain, lambda _t, _s: None)
+    return with_each(found, each, options.level)
+
+
+def _together(
+    drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, given: Model, holdout: Sequence[tuple[str, Signals]],
+    options: Options, tell: Tell,
+) -> Diagnosis:  # fmt: skip
+    """One competition over all drives."""
     model = with_known(given, vehicle)
-    tell = progress or (lambda _text, _share: None)
     tell("preparing", 0.0)
     ready, notes = _prepared(drives, vehicle)
     notes += tuple(f"Known: {term_words(t)}." for t in model.terms[len(given.terms) :])
@@ -107,6 +123,9 @@ def diagnose(
     agreed = () if chosen is None else agreements(found, chosen)
     causes = tuple(widened(c, agreed) for c in outcome.causes)
     outcome, named = outcome._replace(causes=causes), {c.key for c in causes}
+    if outcome.verdict in ("named", "compound") and contradicted(causes, agreed):
+        why = "Not named: the drives contradict each other, see drive by drive."
+        outcome = outcome._replace(verdict="cannot_tell", certain=frozenset(), notes=(*outcome.notes, why))
     quiet = evidence.residuals if chosen is None else chosen.residuals
     noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, ready, strict=True)]
     if road is not None:

@@ -1,10 +1,14 @@
 """Several drives: each is asked by itself, and predicted from the others."""
 
+from dataclasses import replace
+
 import pytest
 
-from aqualog.diagnose.agreement import widened
-from aqualog.diagnose.records import Agreement, ByDrive, Cause, Estimate
+from aqualog.diagnose.agreement import contradicted, widened
+from aqualog.diagnose.alone import with_each
+from aqualog.diagnose.records import Agreement, ByDrive, Cause, Diagnosis, Estimate
 from aqualog.diagnose.run import Options, diagnose
+from aqualog.model.term import Model
 from tests.diagnose.test_drive import CAR, term
 from tests.diagnose.test_run import few, noisy  # noqa: F401 - `few` is a fixture
 
@@ -80,3 +84,37 @@ def test_what_belongs_to_the_car_is_in_all_drives():
     cause = Cause("aero_drag", None, {"delta_drag_area": Estimate(60.0, 50.0, 70.0, "m^2")}, (), "")
     found = widened(cause, [Agreement("aero_drag", "delta_drag_area", of_drives(2.0, 180.0, -3.0), 1e-9)])
     assert "only" not in found.sentence
+
+
+def test_a_load_of_one_drive_is_named_with_the_drive():
+    """A third of it in all three is what no drive confirms."""
+    d = diagnose(drives(0.0, 200.0, 0.0), CAR, options=replace(OPTIONS, surrogates=9))
+    assert (d.verdict, [c.key for c in d.causes]) == ("named", ["payload_mass"])
+    assert d.sentence.endswith("In drive 1 only.")
+    assert d.causes[0].parameters["delta_mass"].value == pytest.approx(200.0, abs=40.0)
+    assert any(n.startswith("drive 1 by itself: The car weighed") for n in d.notes)
+
+
+def test_drives_that_share_an_effect_have_one_cause_with_their_mean():
+    def own(value, name):
+        estimate = Estimate(value, value - 2.0, value + 2.0, "m/s")
+        cause = Cause("head_wind", None, {"speed": estimate}, (), "A head wind blew.", 0.96)
+        return replace(nothing, verdict="named", causes=(cause,), drives=(name,), sentence=cause.sentence)
+
+    nothing = Diagnosis("no_effect", "No effect.", ("a", "b", "c"), 300.0, 300.0, Model(), ())
+    found = with_each(nothing, {"a": own(8.0, "a"), "b": nothing, "c": own(10.0, "c")}, 0.01)
+    (cause,) = found.causes
+    speed = cause.parameters["speed"]
+    assert (speed.value, speed.high - speed.low) == pytest.approx((9.0, 4.0 / 2.0**0.5))
+    assert cause.sentence.endswith("In a and c only.")
+    radius = Cause("tyre_radius", "fl", {"delta": Estimate(0.01, 0.009, 0.011, "-")}, (), "The tyre is larger.", 0.97)
+    car = with_each(nothing, {"a": replace(nothing, verdict="named", causes=(radius,), sentence="It is larger.")}, 0.01)
+    assert (car.verdict, car.notes) == ("no_effect", ("a by itself: It is larger.",))
+
+
+def test_what_only_some_drives_have_contradicts_a_name_of_the_car():
+    cause = Cause("tyre_radius", None, {"delta": Estimate(-0.006, -0.014, 0.002, "-")}, (), "")
+    differ = Agreement("tyre_radius", "delta", of_drives(0.0, -12.0, 1.0), 1e-9)
+    assert contradicted([cause], [differ])
+    assert not contradicted([cause], [replace(differ, p_value=0.4)])
+    assert not contradicted([replace(cause, parameters={"delta": Estimate(-6e-3, -9e-3, -3e-3, "-")})], [differ])
