@@ -17,7 +17,8 @@ from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.registry import all_of
 from aqualog.detect.resistance import RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
-from aqualog.detect.spin import SPIN_DOWN, SPIN_UP
+from aqualog.detect.spin import SPIN_DOWN
+from aqualog.detect.spin_up import SPIN_UP
 
 __all__ = ["BRAKING_GAP_S", "GAP_S", "Way", "episodes_of"]
 

@@ -21,7 +21,8 @@ from aqualog.detect.margin.watch import MARGIN, PROBABLE
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import LEVEL, MEASURE, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
-from aqualog.detect.spin import HELD_S, MU_FULL, SLIP_FULL, SPIN_DOWN, SPIN_UP, spins_round
+from aqualog.detect.spin import HELD_S, MU_FULL, SLIP_FULL, SPIN_DOWN, spins_round
+from aqualog.detect.spin_up import SPIN_UP
 from aqualog.physics.load import G
 from aqualog.physics.slip import slip_of_wheel_speed
 

@@ -28,7 +28,8 @@ from aqualog.detect.joint_criteria import (
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.resistance import MEASURE, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
-from aqualog.detect.spin import SPIN_DOWN, SPIN_UP, has_lost_traction, spins_round
+from aqualog.detect.spin import SPIN_DOWN, has_lost_traction, spins_round
+from aqualog.detect.spin_up import SPIN_UP
 
 __all__ = ["JOINT_CUSUM", "TERMS", "JointCusumParams", "JointCusumWatch", "terms"]
 

@@ -19,7 +19,8 @@ from aqualog.detect.rivals.slope_line import SLOPE_KALMAN, SLOPE_RLS
 from aqualog.detect.rivals.wheel_oscillation import WHEEL_OSCILLATION
 from aqualog.detect.rivals.wheel_thresholds import WHEEL_THRESHOLDS
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
-from aqualog.detect.spin import SPIN_DOWN, SPIN_UP
+from aqualog.detect.spin import SPIN_DOWN
+from aqualog.detect.spin_up import SPIN_UP
 from aqualog.detect.tie_rod import TIE_ROD
 
 __all__ = ["BY_NAME", "DETECTORS", "OWN", "RIVALS", "all_of", "check_needs", "running_order"]

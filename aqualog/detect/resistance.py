@@ -18,7 +18,7 @@ from aqualog.detect.detector import Detector, Needs, Output, Scene, Setup, missi
 from aqualog.detect.events import AFTER, SINCE
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
-from aqualog.detect.spin import SPIN_DOWN, SPIN_UP
+from aqualog.detect.spin import HELD_BACK, SPIN_DOWN
 
 __all__ = [
     "LEVEL", "MEASURE", "MIN_RATE", "RESISTANCE", "ResistanceWatch", "alarm_params", "trusted_measure",
@@ -35,6 +35,7 @@ V_MIN = 14.0  # [m/s] below 50 km/h even 2 mm of water cost less than 0.12 m/s^2
 CLIP = 0.8  # [m/s^2] a gear change or a bump shows more for a moment than water ever does (C46)
 V_OFFSET = 5.0  # [m/s] from here on the dry offset is learnt; the less water shows, the better
 BRAKE_UNSURE = 0.2  # [-] of a brake's torque that no log knows
+BACK, BACK_S = 0.03, 1.0  # [m/s, s] a sum beyond the drift that shows a force at all, and how long it is remembered
 A_OFFSET = 1.0  # [m/s^2] beyond, a wrong mass shows in the measure, and curves cost more than the model knows
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering itself costs more than water does
 
@@ -79,7 +80,8 @@ def usable_for_offset(
 class ResistanceWatch:
     """Resistance measure, its offset on dry road, and its alarm.
 
-    The trusted measure (n,) [m/s²] is shared as `MEASURE`. Where a wheel or the slip slope suggests that this is not
+    The trusted measure (n,) [m/s²] is shared as `MEASURE`, and as `HELD_BACK` where something holds the car back, or
+    where that is not known. Where a wheel or the slip slope suggests that this is not
     dry road, the offset is frozen.
     """
 
@@ -90,7 +92,8 @@ class ResistanceWatch:
         self._online = online.OnlineParams.make(setup.dt) if setup.settings.learns_offset else None
         self._offset = online.initial_state()
         self._sum, self._ages = cusum.initial_state(), cusum.new_ages()
-        self._frozen = 0
+        self._back_params, self._back = CusumParams(0.5 * LEVEL, BACK, 2.0 * BACK, setup.dt), cusum.initial_state()
+        self._frozen = self._held = 0
 
     def push(self, scene: Scene) -> Output:
         """Take the next piece: one track, the sum. [m/s]"""
@@ -118,7 +121,10 @@ class ResistanceWatch:
             SINCE: ("first", np.minimum(since, LATEST)),
             AFTER: ("last", after),
         }
-        return Output(((self._setup.track(g, bits), evidence),), features, {MEASURE: x})
+        _, back, self._back = cusum.scan(self._back_params, self._back, np.clip(sure, -CLIP, CLIP))
+        held, self._held = hold_on(back, self._held, seconds=BACK_S, dt=self._dt)
+        shared = {MEASURE: x, HELD_BACK: held | np.isnan(measure)}
+        return Output(((self._setup.track(g, bits), evidence),), features, shared)
 
     def _braked(self, scene: Scene) -> FloatArray:
         """Return the deceleration that negative torques make. (n,) [m/s²]"""
@@ -141,5 +147,5 @@ RESISTANCE = Detector(
     threshold=THRESHOLD,
     needs=_needs,
     start=ResistanceWatch,
-    reads=(SPIN_DOWN, MINOR_SPIN_DOWN, SPIN_UP, SLIP_SLOPE_DROP),
+    reads=(SPIN_DOWN, MINOR_SPIN_DOWN, SLIP_SLOPE_DROP),
 )

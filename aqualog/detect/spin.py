@@ -23,8 +23,6 @@ from aqualog.detect.detector import (
     Output,
     Scene,
     Setup,
-    missing_drivetrain,
-    missing_torques,
     missing_wheels,
     too_slow,
     traction,
@@ -33,7 +31,7 @@ from aqualog.features.stream import Features
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
-    "HELD_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SPIN_UP", "SpinParams", "SpinState",
+    "HELD_BACK", "HELD_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SpinParams", "SpinState",
     "SpinWatch", "has_lost_traction", "initial_state", "scan", "spins_round", "wheel_evidence",
 ]  # fmt: skip
 
@@ -43,6 +41,7 @@ HELD_S = 0.15  # [s] for which the traction stays below that: on snow it passes 
 MU_SPIN_UP = 0.07  # [-] thesis 2.1: above it, spin-up is that of another slippery road (C27)
 SIDEWAYS = 3.0  # [m/s^2] of drift: a car that spins round, whose tyres hold it sideways and so little ahead (K)
 SLIP_FULL = -0.25  # [-] a wheel that has lost a quarter of its speed has lost the road
+HELD_BACK = "held_back"  # where something holds the car back, as later detectors find it
 MU_FULL = 0.02  # [-] what a spinning driven wheel still transmits at full aquaplaning
 
 
@@ -135,8 +134,8 @@ def scan(
     v_x : array (n,)
         Velocity; a coarse one suffices, since it only decides the sign. [m/s]
     allowed : bool array (n,)
-        Where an alarm may begin, once that has held for `t_held` (spin-up: traction coefficient below 0.07, and the car
-        does not spin round).
+        Where an alarm may begin, once that has held for `t_held` (spin-up: traction coefficient below 0.07, something
+        holds the car back, and the car does not spin round).
 
     Returns
     -------
@@ -174,7 +173,9 @@ class SpinWatch:
         for wheel in (w for w in scene.wheels if w in self._wheels):
             # only a spinning driven wheel has the water's resistance booked on it
             mu = traction(f, wheel) if self._is_up else f.get(f"mu_{wheel}")
-            allowed = has_lost_traction(f, wheel) if self._is_up else np.ones(scene.size, dtype=bool)
+            allowed = np.ones(scene.size, dtype=bool)
+            if self._is_up:
+                allowed = has_lost_traction(f, wheel) & scene.shared.get(HELD_BACK, allowed)
             g, bits, self._states[wheel] = scan(
                 self._params, self._states[wheel], f[f"a_w_delta_{wheel}"], f[f"v_w_delta_{wheel}"], f["v_x_hat"],
                 allowed,
@@ -230,15 +231,6 @@ def _needs_down(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Need
     return Needs((*(omega if is_blind else ()), *too_slow(rate_hz, MIN_RATE)), tuple(omega))
 
 
-def _needs_up(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
-    omega = missing_wheels(have, vehicle.driven)
-    is_blind = len(omega) == len(vehicle.driven)
-    return Needs(
-        (*(omega if is_blind else ()), *missing_drivetrain(vehicle), *too_slow(rate_hz, MIN_RATE)),
-        (*omega, *missing_torques(vehicle, have)),
-    )
-
-
 SPIN_DOWN = Detector(
     name="spin_down",
     title="Spin-down",
@@ -249,17 +241,4 @@ SPIN_DOWN = Detector(
     needs=_needs_down,
     start=partial(SpinWatch, sign=-1.0),
     severity=lambda evidence: "full" if evidence.get("slip_min", 0.0) < SLIP_FULL else "partial",
-)
-SPIN_UP = Detector(
-    name="spin_up",
-    title="Spin-up",
-    unit="m/s",
-    meaning="speed that a wheel gains faster than a healthy one can",
-    statistic="speed a driven wheel gained faster than the vehicle",
-    threshold=THRESHOLD,
-    needs=_needs_up,
-    start=partial(SpinWatch, sign=1.0),
-    # thesis 2.5, criterion 3: full and partial by the traction coefficient over the whole event, since its least value
-    # is that of a moment in which the torque changes; partial where it is unknown
-    severity=lambda evidence: "full" if evidence.get("mu_lost", 0.0) > 0.5 else "partial",
 )

@@ -74,6 +74,7 @@ class Plant(NamedTuple):
     h_onset: FloatArray
     tread_gain: FloatArray
     contact_exponent: FloatArray
+    aspect_exponent: FloatArray
     contact_gain: FloatArray  # multiplies the lost contact
     wedge_arm: FloatArray
     h_film: FloatArray
@@ -103,8 +104,8 @@ def understeer_gradient(cornering_slope: float) -> float:
 _OF_CAR = ("mass", "l_f", "l_r", "h_cg", "track", "drag_area", "air_density")
 _OF_TYRES = (
     "load_sensitivity", "wet_friction", "tread_depth", "tread_capacity", "half_length", "width", "v_anchor",
-    "pressure_exponent", "thin_gain", "h_bulk", "h_onset", "tread_gain", "contact_exponent", "wedge_arm",
-    "h_film", "groove_relief", "h_wave", "h_track", "track_irregularity", "contact_scatter",
+    "pressure_exponent", "thin_gain", "h_bulk", "h_onset", "tread_gain", "contact_exponent", "aspect_exponent",
+    "wedge_arm", "h_film", "groove_relief", "h_wave", "h_track", "track_irregularity", "contact_scatter",
 )  # fmt: skip
 _ADDED = ("head_wind", "cornering_drag", "warmup_extra", "towed_mass", "leak_start")
 _ADDED_AT_WHEELS = (

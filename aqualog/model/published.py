@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
-from math import inf, isfinite, nan
+from math import inf, isfinite, nan, sqrt
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,7 @@ KMH = 1.0 / 3.6  # [m/s]
 MASS = 1650.0  # [kg] of the car that a drag in m/s² belongs to; both front wheels are in the water
 MARKS = {"L": "read in an abstract or excerpt", "V": "seen where it is quoted", "K": "from memory, not verified"}
 CRITERIA = ("spin-down", "15 % slip", "contact")
+ASPECT = 1.2  # [-] width over length of the contact of a car tyre, 168 mm of tread (K) over its 140 mm
 DEMAND = 0.3  # traction of a driven wheel in full acceleration near 80 km/h, over its load (D)
 _SLOWED = 1.0 - 0.1 * (1.0 - float(SPIN_UP_RATIO))  # v_full of a wheel at 10 % spin-down over that of a rolling one
 V_MOST = 200.0  # [km/h] a tyre that does not float up to here counts as if it did there
@@ -47,18 +48,23 @@ QUANTITIES = {
 """Quantities with their units."""
 
 _NUMBERS = {"depth": (0.0, 50.0), "tread": (0.0, 20.0), "pressure": (0.5, 10.0), "load": (500.0, 20000.0)}
+_SOME = {"speed": (1.0, 400.0), "aspect": (0.2, 4.0)}
 _TEXTS = ("id", "quantity", "path", "mark", "source", "where")
 
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """Water [mm], tread [mm], inflation pressure [bar], wheel load [N], and for some quantities a speed. [km/h]"""
+    """Water [mm], tread [mm], inflation pressure [bar], wheel load [N], and for some quantities a speed. [km/h]
+
+    `aspect`: width over length of the contact at that load and pressure, if it is not a modern car tyre's. [-]
+    """
 
     depth: float
     tread: float
     pressure: float
     load: float
     speed: float = nan
+    aspect: float = nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +149,7 @@ def _point(table: Mapping[str, Any], i: int) -> Point:
     def fail(what: str, expected: str) -> ConfigError:
         return ConfigError(what, where=where, expected=expected)
 
-    known = {*_TEXTS, *_NUMBERS, "low", "high", "tolerance", "speed", "criterion", "over", "assumed", "reason"}
+    known = {*_TEXTS, *_NUMBERS, *_SOME, "low", "high", "tolerance", "criterion", "over", "assumed", "reason"}
     if strange := sorted(set(table) - known):
         raise fail(f"unknown key {strange[0]}", ", ".join(sorted(known)))
     if missing := [k for k in (*_TEXTS, *_NUMBERS, "low", "high", "tolerance") if k not in table]:
@@ -168,8 +174,8 @@ def _point(table: Mapping[str, Any], i: int) -> Point:
         raise fail("over", "the other condition, for drag_ratio alone")
     over = _condition({**table, **table["over"]}, where) if "over" in table else None
     assumed = tuple(table.get("assumed", ()))
-    if odd := next((k for k in assumed if k not in _NUMBERS), None):
-        raise fail(f"assumed {odd}", ", ".join(_NUMBERS))
+    if odd := next((k for k in assumed if k not in (*_NUMBERS, "aspect")), None):
+        raise fail(f"assumed {odd}", ", ".join((*_NUMBERS, "aspect")))
     return Point(
         low=low, high=high, tolerance=tolerance, at=at, criterion=criterion, over=over, assumed=assumed,
         reason=table.get("reason", ""), **texts,
@@ -177,8 +183,8 @@ def _point(table: Mapping[str, Any], i: int) -> Point:
 
 
 def _condition(table: Mapping[str, Any], where: str) -> Condition:
-    speed = _number(table, "speed", 1.0, 400.0, where) if "speed" in table else nan
-    return Condition(speed=speed, **{k: _number(table, k, *bounds, where) for k, bounds in _NUMBERS.items()})
+    given = {k: bounds for k, bounds in (_NUMBERS | _SOME).items() if k in _NUMBERS or k in table}
+    return Condition(**{k: _number(table, k, *bounds, where) for k, bounds in given.items()})
 
 
 def _number(table: Mapping[str, Any], name: str, low: float, high: float, where: str) -> float:
@@ -191,8 +197,14 @@ def _number(table: Mapping[str, Any], name: str, low: float, high: float, where:
 
 
 def tyre_of(at: Condition, base: Tyre | None = None) -> Tyre:
-    """The tyre of a condition: `base` (worn summer) with that depth of tread."""
-    return replace(base or Tyre(), tread_depth=at.tread * 1e-3)
+    """The tyre of a condition: `base` (worn summer) with that depth of tread, and a contact of that aspect and the same
+    area."""
+    tyre = replace(base or Tyre(), tread_depth=at.tread * 1e-3)
+    if not isfinite(at.aspect):
+        return tyre
+    own = ASPECT * sqrt(F_Z_HALF_LENGTH / at.load * at.pressure * 1e5 / P_HALF_LENGTH)
+    longer = sqrt(own / at.aspect)
+    return replace(tyre, half_length=tyre.half_length * longer, width=tyre.width / longer)
 
 
 def full_speed(tyre: Tyre, at: Condition, criterion: str = "contact") -> float:

@@ -46,15 +46,19 @@ class Tyre:
         "m", 0.07, 0.02, 0.3, "half contact length at 4 kN and 2.2 bar",
         "QRA1, QRA2 (V, [besselink2010]): 0.066-0.074 (D)",
     )  # fmt: skip
-    width: float = _of("m", 0.205, 0.05, 0.6, "width of the contact", "205/55R16")
+    width: float = _of("m", 0.205, 0.05, 0.6, "width of the contact", "205/55R16; its tread is 0.82 of that (K)")
     v_anchor: float = _of(
         "m/s", 120.5 / 3.6, 5.0, 100.0, "full aquaplaning of an even contact at 1.3 mm, 1.9 bar, 4 kN, 1.6 mm of tread",
         "A: fluctuating and turning slower, 3 of 4 front wheels stop within 0.5 s at 118 km/h",
     )  # fmt: skip
     pressure_exponent: float = _of(
-        "-", 0.3, 0.0, 1.0, "m of v_full ~ p^m", "fitted; 0.5 [horne1963], 0.3 [gallaway1979] (K)"
+        "-", 0.3, 0.0, 1.0, "m of v_full ~ p^m", "fitted; 0.5 - k / 2 by [horne1963], 0.3 [gallaway1979] (K)"
     )
-    thin_gain: float = _of("-", 0.58, 0.0, 3.0, "v_full of thin films over that of bulk water, less 1", "fitted")
+    aspect_exponent: float = _of(
+        "-", 0.4, 0.0, 1.0, "k of v_full ~ (length over width of the contact)^k, so ~ load^(k / 2)",
+        "fitted; 0.5 [horne1986], 0.4 by the load in [gunaratne2012] (K)",
+    )  # fmt: skip
+    thin_gain: float = _of("-", 0.63, 0.0, 3.0, "v_full of thin films over that of bulk water, less 1", "fitted")
     h_bulk: float = _of(
         "m", 2.0e-3, 1e-4, 0.05, "depth at which bulk water begins to rule",
         "0.08 in: treaded tyres' limit (V, [gengenbach1968])",
@@ -109,7 +113,7 @@ class Tyre:
         """The numbers of `physics.hydroplaning.full_aquaplaning_speed`."""
         return WaterLaw(
             self.v_anchor, self.pressure_exponent, self.thin_gain, self.h_bulk, self.h_onset, self.tread_gain,
-            self.contact_exponent,
+            self.contact_exponent, self.aspect_exponent,
         )  # fmt: skip
 
     def as_fitted(self, car: Vehicle, given: Iterable[str] = ()) -> Tyre:
@@ -120,7 +124,7 @@ class Tyre:
         """Return the speed of full aquaplaning in even water: depth [m], wheel load [N], pressure [Pa] to [m/s]."""
         return full_aquaplaning_speed(
             h_w, F_z, p=p, tread_depth=self.tread_depth, tread_capacity=self.tread_capacity, texture=1.0,
-            law=self.water_law,
+            aspect=0.5 * self.width / self.half_length, law=self.water_law,
         )  # fmt: skip
 
 

@@ -16,22 +16,26 @@ from aqualog.model.tyre import TYRE_KEYS, Tyre
 
 __all__ = ["CORRELATION", "NAMES", "SD", "covariance", "drawn_tyre"]
 
-NAMES = ("v_anchor", "pressure_exponent", "thin_gain", "tread_gain", "contact_exponent", "h_track", "h_film")
+NAMES = (
+    "v_anchor", "pressure_exponent", "thin_gain", "tread_gain", "contact_exponent", "h_track", "h_film",
+    "aspect_exponent",
+)  # fmt: skip
 """Keys of a tyre: speed of full aquaplaning over pressure, depth and tread; n; clearing of the track; drag."""
 
-SD = (0.4, 0.09, 0.065, 6.1, 0.46, 0.15e-3, 0.2e-3)
+SD = (0.4, 0.051, 0.071, 7.0, 0.49, 0.15e-3, 0.2e-3, 0.055)
 """Standard deviations, in the units of `tyre.TYRE_KEYS`."""
 
 CORRELATION = {
-    ("v_anchor", "thin_gain"): 0.29, ("v_anchor", "contact_exponent"): -0.12, ("pressure_exponent", "thin_gain"): 0.16,
-    ("pressure_exponent", "tread_gain"): -0.07, ("thin_gain", "tread_gain"): 0.40,
-    ("thin_gain", "contact_exponent"): 0.35, ("contact_exponent", "h_film"): 0.07,
+    ("v_anchor", "thin_gain"): 0.30, ("v_anchor", "contact_exponent"): -0.11, ("thin_gain", "tread_gain"): 0.45,
+    ("thin_gain", "contact_exponent"): 0.35, ("contact_exponent", "h_film"): 0.08,
+    ("thin_gain", "aspect_exponent"): 0.28, ("tread_gain", "aspect_exponent"): 0.18,
+    ("pressure_exponent", "tread_gain"): -0.12, ("pressure_exponent", "aspect_exponent"): -0.40,
 }  # fmt: skip
 """Correlations of the fit; of pairs that are not named below 0.05."""
 
 
 def covariance() -> FloatArray:
-    """Covariance (7, 7) of the numbers in the order of `NAMES`, in their units."""
+    """Covariance (8, 8) of the numbers in the order of `NAMES`, in their units."""
     c = np.eye(len(NAMES))
     for (a, b), r in CORRELATION.items():
         i, j = NAMES.index(a), NAMES.index(b)

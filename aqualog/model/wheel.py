@@ -278,8 +278,11 @@ def _rolling(i, now, F_z, m, p, q):  # type: ignore[no-untyped-def]
 @part
 def even_full_speed(film, F_z, q):  # type: ignore[no-untyped-def]
     """Return the speed of full aquaplaning of a rolling wheel with the numbers `q` in an even film [m] and load [N]."""
-    law = WaterLaw(q.v_anchor, q.pressure_exponent, q.thin_gain, q.h_bulk, q.h_onset, q.tread_gain, q.contact_exponent)
-    return _v_full(film, F_z, q.p, q.tread_depth, q.tread_capacity, 1.0, law)
+    law = WaterLaw(
+        q.v_anchor, q.pressure_exponent, q.thin_gain, q.h_bulk, q.h_onset, q.tread_gain, q.contact_exponent,
+        q.aspect_exponent,
+    )  # fmt: skip
+    return _v_full(film, F_z, q.p, q.tread_depth, q.tread_capacity, 1.0, 0.5 * q.width / q.half_length, law)
 
 
 @part

@@ -14,9 +14,8 @@ from aqualog.core.records import FloatArray
 from aqualog.physics.water import drained_share
 
 __all__ = [
-    "CAPACITY_ANCHOR", "F_Z_ANCHOR", "H_ANCHOR", "P_ANCHOR", "SPIN_UP_RATIO", "TREAD_ANCHOR", "WaterLaw",
-    "depth_factor", "full_aquaplaning_speed", "gallaway_speed", "horne_speed", "horne_truck_speed", "pavdrn_speed",
-    "usf_speed",
+    "ASPECT_ANCHOR", "CAPACITY_ANCHOR", "F_Z_ANCHOR", "H_ANCHOR", "P_ANCHOR", "SPIN_UP_RATIO", "TREAD_ANCHOR",
+    "WaterLaw", "depth_factor", "full_aquaplaning_speed", "gallaway_speed", "horne_speed", "pavdrn_speed", "usf_speed",
 ]  # fmt: skip
 
 KMH = 1.0 / 3.6  # [m/s]
@@ -27,67 +26,29 @@ INCH = 0.0254  # [m]
 
 H_ANCHOR, P_ANCHOR, F_Z_ANCHOR = 1.3e-3, 1.9e5, 4000.0  # [m, Pa, N] reference of `WaterLaw.v_anchor`
 TREAD_ANCHOR, CAPACITY_ANCHOR = 1.6e-3, 0.4e-3  # [m] its worn tyre: depth of the grooves, and water that they take
+ASPECT_ANCHOR = 0.205 / 0.14  # [-] width over length of its contact, both as a `Tyre` has them
 
 SPIN_UP_RATIO = 7.7 / 9.0  # spin-up over spin-down speed: a wheel that has stopped floats down to a lower speed
 
 
 def horne_speed(p: FloatArray) -> FloatArray:
-    """Spin-down speed of a rotating wheel on a flooded road, v = 9 sqrt(p) kn with p in psi.
+    """Spin-down speed of a rotating wheel on a flooded road, v = 9 sqrt(p) kn with p in psi. [m/s]
 
-    Parameters
-    ----------
-    p : array
-        Inflation pressure, > 0. [Pa]
-
-    Returns
-    -------
-    v : array
-        [m/s]
-
-    180, 200, 220, 240 kPa give 85, 90, 94, 99 km/h. Valid for flooded roads, water deeper than the grooves.
+    `p` inflation pressure, > 0 [Pa]. 180, 200, 220, 240 kPa give 85, 90, 94, 99 km/h. Valid for flooded roads, water
+    deeper than the grooves, and tyres of aircraft. By the aspect of the contact, width over length, it is 7.95
+    sqrt(p / FAR) mph: the same at 0.59. A longer contact floats later.
 
     Source: Horne and Dreher, NASA TN D-2056, 1963 [horne1963]; repeated by T. J. Yager, NASA TM-85652, 1983 (K)
-    [yager1983]. Maleska et al. 2021 [maleska2021] do not confirm this equation, but `horne_truck_speed`.
+    [yager1983]. The aspect: (K) [horne1986]; Maleska et al. [maleska2021] apply it to passenger-car tyres.
     """
     return 9.0 * np.sqrt(p / PSI) * KNOT
 
 
-def horne_truck_speed(p: FloatArray, *, aspect: float) -> FloatArray:
-    """Speed of full aquaplaning by the footprint's aspect ratio, v = 7.95 sqrt(p / FAR) mph with p in psi.
-
-    Parameters
-    ----------
-    p : array
-        Inflation pressure, > 0. [Pa]
-    aspect : float
-        FAR, width over length of the footprint, > 0. [-]
-
-    Returns
-    -------
-    v : array
-        [m/s]
-
-    A longer footprint floats later. 190 kPa and 1.4 (205/55R16 at 4 kN) give 57 km/h.
-
-    Source: (K) [horne1986]; Maleska et al. 2021 [maleska2021] apply it to passenger-car tyres.
-    """
-    return 7.95 * np.sqrt(p / PSI / aspect) * MPH
-
-
 def pavdrn_speed(h_w: FloatArray) -> FloatArray:
-    """Hydroplaning speed of the PAVDRN model for thin films, v = 26.04 h^-0.259 mph with h in inch.
+    """Hydroplaning speed of the PAVDRN model for thin films, v = 26.04 h^-0.259 mph with h in inch. [m/s]
 
-    Parameters
-    ----------
-    h_w : array
-        Water film, 0 ... 2.4 mm. [m]
-
-    Returns
-    -------
-    v : array
-        [m/s]
-
-    For the ASTM E524 tyre [astm_e524_1988] at 165 kPa and 4800 N. 0.6, 1.3, 2.0 mm give 111, 91, 81 km/h.
+    `h_w` water film, 0 ... 2.4 mm [m]. For the ASTM E524 tyre [astm_e524_1988] at 165 kPa and 4800 N. 0.6, 1.3, 2.0 mm
+    give 111, 91, 81 km/h.
 
     Source: as commonly quoted (K) from [anderson1998].
     """
@@ -114,23 +75,9 @@ def gallaway_speed(
 
 
 def usf_speed(h_w: FloatArray, p: FloatArray, F_z: FloatArray) -> FloatArray:
-    """Hydroplaning speed of the USF regression, v = W^0.2 p^0.5 (0.82 / h^0.06 + 0.49) km/h.
+    """Hydroplaning speed of the USF regression, v = W^0.2 p^0.5 (0.82 / h^0.06 + 0.49) km/h. [m/s]
 
-    Parameters
-    ----------
-    h_w : array
-        Water film, > 0. [m]
-    p : array
-        Inflation pressure. [Pa]
-    F_z : array
-        Wheel load. [N]
-
-    Returns
-    -------
-    v : array
-        [m/s]
-
-    W in N, p in kPa, h in mm. The exponent of load in `full_aquaplaning_speed` comes from here.
+    `h_w` water film, > 0 [m]; `p` inflation pressure [Pa]; `F_z` wheel load [N]. W in N, p in kPa, h in mm.
 
     Source: as commonly quoted (K) from [gunaratne2012].
     """
@@ -140,19 +87,9 @@ def usf_speed(h_w: FloatArray, p: FloatArray, F_z: FloatArray) -> FloatArray:
 def depth_factor(h_w: FloatArray | float, *, thin_gain: FloatArray | float, h_bulk: float) -> FloatArray | float:
     """How full aquaplaning comes later in thinner water, (0.82 / h^0.06 + 0.49) (1 + g / (1 + (h / h_bulk)^4)).
 
-    Parameters
-    ----------
-    h_w : array
-        Water film, > 0. [m]
-    thin_gain : array or float
-        g: how much later a film floats that the road's texture and the tread's edges break. [-]
-    h_bulk : float
-        Depth at which bulk water begins to rule. [m]
-
-    Returns
-    -------
-    factor : array
-        Bulk water: that of `usf_speed`, h in mm, nearly flat. Thin films: 1 + g times as much, nearly flat too. [-]
+    `h_w` water film, > 0 [m]; `thin_gain` g: how much later a film floats that the road's texture and the tread's edges
+    break [-]; `h_bulk`: depth at which bulk water begins to rule [m]. Bulk water gives the factor of `usf_speed`, h in
+    mm, nearly flat; thin films 1 + g times as much, nearly flat too. [-]
 
     Full aquaplaning near 118 km/h at 1.3 mm and 120 at 0.8 mm (thesis) and near 75 km/h at 5 to 8 mm (tyre tests) are
     two regimes: no power of the depth joins them and keeps either.
@@ -171,7 +108,7 @@ class WaterLaw(NamedTuple):
     `v_anchor` [m/s]: a tyre with `TREAD_ANCHOR` on asphalt in `H_ANCHOR` at `P_ANCHOR` and `F_Z_ANCHOR`;
     `pressure_exponent` [-]: v ~ p^m; `thin_gain` [-] and `h_bulk` [m] of `depth_factor`; `h_onset` [m]: free water that
     completes two thirds of the wedge; `tread_gain` [1/m]: v ~ 1 + gain times the depth of the grooves; `exponent` [-]:
-    n of `lost_contact`.
+    n of `lost_contact`; `aspect_exponent` [-]: v ~ (length over width of the contact)^k.
     """
 
     v_anchor: float
@@ -181,6 +118,7 @@ class WaterLaw(NamedTuple):
     h_onset: float
     tread_gain: float
     exponent: float
+    aspect_exponent: float
 
 
 def _wedge(h_w: FloatArray | float, tread_capacity: FloatArray | float, h_onset: FloatArray | float) -> FloatArray:
@@ -198,6 +136,7 @@ def full_aquaplaning_speed(
     tread_depth: float,
     tread_capacity: float,
     texture: float,
+    aspect: float,
     law: WaterLaw,
 ) -> FloatArray:
     """Speed at which the dry contact of a tyre vanishes.
@@ -216,6 +155,8 @@ def full_aquaplaning_speed(
         Water that the grooves can take, as a depth. [m]
     texture : float
         How much of what asphalt does to thin films the road does: 1 asphalt, 0 glass. [-]
+    aspect : float
+        Width over length of the contact at the load and pressure of its half length. [-]
     law : WaterLaw
 
     Returns
@@ -223,20 +164,25 @@ def full_aquaplaning_speed(
     v_full : array
         At most 1e6 m/s. [m/s]
 
-    v_anchor (p / p_anchor)^m (F_z / F_z_anchor)^0.2 times the ratios to the anchor of `depth_factor`, of 1 + k TD and
-    of chi^(-1/n). chi = 1 - exp(-h_free / h_onset) is the share of a complete wedge, and lifts that share of what a
-    complete one would. h_free = h (1 - `drained_share`) finds no room in the grooves.
+    v_anchor (p / p_anchor)^m (F_z / F_z_anchor)^(k/2) (aspect / aspect_anchor)^-k times the ratios to the anchor of
+    `depth_factor`, of 1 + gain TD and of chi^(-1/n). chi = 1 - exp(-h_free / h_onset) is the share of a complete wedge,
+    and lifts that share of what a complete one would. h_free = h (1 - `drained_share`) finds no room in the grooves.
+    A contact is longer with load and shorter with pressure, l ~ sqrt(F_z / p): this is p^(m + k/2) (l / width)^k. Water
+    leaves a long, narrow contact before the wedge has reached its end. At one aspect Horne's root of the pressure is
+    left, m + k/2 = 0.5.
     Limits: v_anchor at the anchor; grows with p, F_z and tread, falls with h; no water, no wedge; in deep water the
-    grooves are full, and tread helps by its channels, 1 + k TD.
+    grooves are full, and tread helps by its channels, 1 + gain TD.
 
-    Source: derived. m is 0.5 by [horne1963] and [gunaratne2012], 0.3 by [gallaway1979]; that of load is
-    [gunaratne2012]'s. The anchor is a pass of [fichtinger2024], C16. The numbers are fitted (`model/water_law.py`).
+    Source: derived. m + k/2 is 0.5 by [horne1963]; k is 0.5 by [horne1986], for car tyres too [maleska2021], and 0.4 by
+    the load in [gunaratne2012]; [gallaway1979] has m = 0.3. The anchor is a pass of [fichtinger2024], C16. The numbers
+    are fitted (`model/water_numbers.py`).
     """
     wedge = _wedge(h_w, tread_capacity, law.h_onset) / _wedge(H_ANCHOR, CAPACITY_ANCHOR, law.h_onset)
     gain = texture * law.thin_gain
     depth = depth_factor(np.maximum(h_w, 1e-9), thin_gain=gain, h_bulk=law.h_bulk)
     depth = depth / depth_factor(H_ANCHOR, thin_gain=law.thin_gain, h_bulk=law.h_bulk)
     channels = (1.0 + law.tread_gain * tread_depth) / (1.0 + law.tread_gain * TREAD_ANCHOR)
-    v = law.v_anchor * (p / P_ANCHOR) ** law.pressure_exponent * (np.maximum(F_z, 1.0) / F_Z_ANCHOR) ** 0.2
+    v = law.v_anchor * (p / P_ANCHOR) ** law.pressure_exponent
+    v = v * (np.sqrt(np.maximum(F_z, 1.0) / F_Z_ANCHOR) * ASPECT_ANCHOR / aspect) ** law.aspect_exponent
     v_full: FloatArray = np.minimum(v * depth * channels / np.maximum(wedge, 1e-30) ** (1.0 / law.exponent), 1e6)
     return v_full

@@ -96,7 +96,7 @@ def test_each_runs_after_what_it_reads():
     assert len(order) == len(BY_NAME)
     for i, detector in enumerate(order):
         assert not set(detector.reads) - set(order[:i]), detector.name
-    assert [d.name for d in running_order(OWN)][3:5] == ["slip_slope_drop", "resistance"]
+    assert [d.name for d in running_order(OWN)][2:5] == ["slip_slope_drop", "resistance", "spin_up"]
 
 
 @pytest.mark.parametrize("name", BY_NAME)

@@ -8,12 +8,14 @@ import pytest
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import Track
 from aqualog.detect import spin as gate
+from aqualog.detect.braking import UNLOGGED
 from aqualog.detect.detector import Scene, Setup
 from aqualog.detect.events import EventBook
 from aqualog.detect.joint_criteria import GATE, GATE_AFTER, MAY_BE_WATER, ROTATES
 from aqualog.detect.joint_cusum import JOINT_CUSUM
-from aqualog.detect.resistance import MEASURE
-from aqualog.detect.spin import HELD_S, SPIN_DOWN, SPIN_UP, SpinParams, SpinWatch, initial_state, scan
+from aqualog.detect.resistance import MEASURE, RESISTANCE
+from aqualog.detect.spin import HELD_BACK, HELD_S, SPIN_DOWN, SpinParams, SpinWatch, initial_state, scan
+from aqualog.detect.spin_up import SPIN_UP
 from aqualog.features.stream import FeatureStream
 from aqualog.features.velocity import initial_state as initial_motion
 from aqualog.features.velocity import observe, params_from_seconds
@@ -47,8 +49,8 @@ def test_a_spin_up_needs_lost_traction_for_a_while(length, begins):
     assert spin(1.0, allowed).any() == begins
 
 
-@pytest.mark.parametrize(("yaw_rate", "begins"), [(0.0, True), (0.1, True), (0.5, False)])
-def test_a_car_that_spins_round_has_no_spin_up(yaw_rate, begins):
+@pytest.mark.parametrize(("yaw_rate", "held", "begins"), [(0, 1, True), (0.1, 1, True), (0.5, 1, False), (0, 0, False)])
+def test_a_car_that_spins_round_or_that_nothing_holds_back_has_no_spin_up(yaw_rate, held, begins):
     one = np.ones(40)
     f = {
         f"{n}_{w}": x * one
@@ -57,17 +59,28 @@ def test_a_car_that_spins_round_has_no_spin_up(yaw_rate, begins):
     }
     f |= {"v_x_hat": 20.0 * one, "a_y_slow": 0.0 * one, "yaw_rate_slow": yaw_rate * one}
     watch = SpinWatch(Setup(SPIN_UP, SEDAN, 0.01, 0.6), sign=1.0)
-    scene = Scene(f, dict.fromkeys(WHEELS, one < 0))
+    scene = Scene(f, dict.fromkeys(WHEELS, one < 0), shared={HELD_BACK: one == held})
     found = watch.push(scene).found
     assert [track.active.any() for track, _ in found] == [begins, begins]
-    # nor does a wheel that has not begun one count in the sum
+    # nor does a wheel that has not begun one count in the sum, but for its gate
     bare = tuple(replace(track, active=one < 0) for track, _ in found)
     more = {"delta_a_x": one, "criterion_full": one}
     shared = {MEASURE: one, GATE: one > 0, GATE_AFTER: one, MAY_BE_WATER: one > 0, ROTATES: one < 0}
     output = JOINT_CUSUM.start(Setup(JOINT_CUSUM, SEDAN, 0.01, 1.0)).push(
         Scene(f | more, scene.braking, {}, bare, shared)
     )
-    assert (output.features["joint_term_spin_up"] > 0.0).any() == begins
+    assert (output.features["joint_term_spin_up"] > 0.0).any() == (yaw_rate < 0.5)
+
+
+def test_water_holds_a_car_back_and_ice_does_not():
+    """0.3 m/s² shows within 0.2 s and is remembered for 1 s; a measure that is not known rules nothing out."""
+    t = np.arange(500) * DT
+    x = np.where((t > 1.0) & (t < 1.5), 0.3, np.where(t > 4.0, np.nan, 0.0))
+    f = {"delta_a_x": x, "v_x_hat": 25.0 + 0.0 * t, "a_kin_slow": 0.0 * t, "a_y_slow": 0.0 * t}
+    watch = RESISTANCE.start(Setup(RESISTANCE, SEDAN, DT, 0.2))
+    held = watch.push(Scene(f, dict.fromkeys((*WHEELS, UNLOGGED), t < 0.0))).shared[HELD_BACK]
+    assert held[100:401:10].tolist() == [0.0] * 2 + [1.0] * 17 + [0.0] * 12
+    assert held[402:].all()
 
 
 def test_a_gap_of_the_lateral_acceleration_is_no_slide():

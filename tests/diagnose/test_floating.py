@@ -11,7 +11,7 @@ from aqualog.model.sensors import IDEAL
 from tests.diagnose.test_drive import CAR, changed, signals, term
 
 SPEED = ((0.0, 22.0), (28.0, 22.0), (32.0, 34.0), (44.0, 34.0), (52.0, 20.0))
-LANES = tuple(Lane(t, t + 6.0, in_metres=False, depth_left=1.6e-3, depth_right=1.8e-3) for t in (8.0, 18.0, 36.0, 60.0))
+LANES = tuple(Lane(t, t + 6.0, in_metres=False, depth_left=1.5e-3, depth_right=1.7e-3) for t in (8.0, 18.0, 36.0, 60.0))
 
 
 def wet(*terms, sensors=IDEAL, lanes=LANES):

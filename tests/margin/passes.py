@@ -82,7 +82,7 @@ def any_tyre(tyre: Tyre, rng: np.random.Generator, exponents: tuple[float, float
     tread_gain, n = even(10.0, 50.0), even(*exponents)
     # contact that is lost early ends far beyond the speed at which a wheel stops, and that speed is to be any car's
     v_anchor *= (1.0 - STOP_L) ** (1.0 / LAWS[0][0] - 1.0 / min(n, LAWS[0][0]))
-    return replace(
+    drawn = replace(
         tyre, v_anchor=v_anchor, pressure_exponent=pressure_exponent, thin_gain=thin_gain, tread_gain=tread_gain,
         contact_exponent=n, wedge_arm=tyre.wedge_arm * 1.5 * rng.uniform() ** 2,
         h_film=even(0.15e-3, 1.0e-3), groove_relief=rng.uniform(0.2, 0.9), h_wave=even(0.8e-3, 4e-3),
@@ -90,6 +90,8 @@ def any_tyre(tyre: Tyre, rng: np.random.Generator, exponents: tuple[float, float
         load_sensitivity=rng.uniform(0.0, 0.3), contact_scatter=even(0.001, 0.12), scatter_length=even(0.2, 2.0),
         track_irregularity=even(0.03, 0.4), slip_slope_factor=tyre.slip_slope_factor * even(0.8, 1.2),
     )  # fmt: skip
+    # such a width stands for the drag alone
+    return replace(drawn, v_anchor=drawn.v_anchor * (drawn.width / tyre.width) ** drawn.aspect_exponent)
 
 
 def own_pass(

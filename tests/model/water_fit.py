@@ -18,7 +18,7 @@ KMH = 1 / 3.6
 # from elsewhere: value and standard deviation
 ELSEWHERE = {
     "v_anchor": (120.5 * KMH, 1.5 * KMH),  # 3 of 4 front wheels stop within 0.5 s at 118 km/h (C16), by simulation
-    "pressure_exponent": (0.45, 0.1),  # 0.5 by Horne and USF, 0.3 by Gallaway (K)
+    "aspect_exponent": (0.45, 0.07),  # k: 0.5 by Horne's formula of 1986, 0.4 by the load in USF's (K)
     "contact_exponent": (4.0, 0.7),  # minor spin-downs grow in number from 98 to 106 km/h (C15); 4-6 by half the slope
     "h_track": (0.5e-3, 0.15e-3),  # below the least depth tested, 0.6 mm (D)
     "h_film": (0.5e-3, 0.2e-3),  # C_D of 0.7 (K)
@@ -37,6 +37,8 @@ def residuals(x, scale):
         new, worn = (Condition(depth, tread, 1.9, 4000.0) for tread in (7.8, 1.6))
         later = full_speed(tyre_of(new, t), new, "spin-down") - full_speed(tyre_of(worn, t), worn, "spin-down")
         out.append((later - LATER) / LATER_SD)
+    # Horne's root of the pressure at one aspect
+    out.append((t.pressure_exponent + 0.5 * t.aspect_exponent - 0.5) / 0.05)
     return np.array(out + [(getattr(t, n) - value) / sd for n, (value, sd) in ELSEWHERE.items()])
 
 

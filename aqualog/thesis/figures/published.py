@@ -118,6 +118,7 @@ def _row(r: Compared) -> tuple[str, ...]:
     unit = "" if p.unit == "-" else f" {p.unit}"
     condition = f"{at.depth:g} mm, tread {at.tread:g} mm, {at.pressure:g} bar, {at.load:g} N"
     condition += f", {at.speed:g} km/h" if np.isfinite(at.speed) else ""
+    condition += f", contact {at.aspect:g} as wide as long" if np.isfinite(at.aspect) else ""
     condition += f"; {p.path}" if p.path != "straight" else ""
     condition += f"; assumed: {', '.join(p.assumed)}" if p.assumed else ""
     low, high = _number(p.low, p.unit), _number(p.high, p.unit)
