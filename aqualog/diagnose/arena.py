@@ -28,8 +28,8 @@ from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
 
 __all__ = [
-    "CHUNK", "SHAPE_PRIOR", "Arena", "Field", "Part", "arena_of", "blocks_of", "known_only", "make_arena", "products",
-    "unit_force",
+    "CHUNK", "SHAPE_PRIOR", "Arena", "Field", "Part", "arena_of", "blocks_of", "competing", "known_only", "make_arena",
+    "products", "unit_force",
 ]  # fmt: skip
 
 # of an effect at any place, of a shape of a mechanism, and of a road that is not even, on one drive (K)
@@ -220,6 +220,14 @@ def _stretches(drives: Sequence[Drive]) -> list[tuple[int, slice]]:
             start = int(np.argmax(total[left:] - total[:-left]))
             return [(d, slice(start, start + left))]
     return out
+
+
+def competing(parts: Sequence[Part], drives: Sequence[Drive]) -> tuple[str, ...]:
+    """A note on the drives that no part of the competition is of."""
+    there = {p.drive for p in parts}
+    left = [d.name for i, d in enumerate(drives) if i not in there]
+    most = f"the longest, up to {MOST_BLOCKS * 0.1 / 60.0:.0f} min together, decide between the causes"
+    return (f"Of these drives {most}; left out: {', '.join(left)}.",) if left else ()
 
 
 def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, ...], FloatArray]:

@@ -25,6 +25,7 @@ from aqualog.model.term import Model, Term
 
 __all__ = ["RESERVED", "Drive", "floating", "led_by", "prepare", "rolling_under", "stretches"]
 
+LITTLE = 0.5  # share of the time on water that is judged, below which a note says so
 BESIDE_S = 1.0  # [s] before and after what is left out
 BEHIND_S = 1.0  # [s] after a stretch of water, in which the rear axle and the speed still have it
 LEAST_RATE_HZ = 5.0
@@ -177,6 +178,10 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
             notes.append(f"{unlogged}: brakes are not in the log, driven stretches are used")
     left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(logged, vehicle, dt) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
+    on_water = block_means((_depth(course) > 0.0).astype(np.float64), dt) > 0.0
+    water_s, judged_s = (float(x.sum()) * block_step(dt) for x in (on_water, on_water & mask))
+    if judged_s < LITTLE * water_s:
+        notes.append(f"of {water_s:.0f} s on water {judged_s:.0f} s are judged: in the rest a wheel may float")
     return Drive(
         name, dt, vehicle, course, speed, filled, channels, mask, _coordinates(filled, course, speed, v, dt), present,
         not torqued, n * dt, tuple(notes),

@@ -16,6 +16,7 @@ from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, contradicted, widened
 from aqualog.diagnose.alone import MOST, with_each
 from aqualog.diagnose.any_effect import SURROGATES
+from aqualog.diagnose.arena import competing
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
@@ -118,6 +119,7 @@ def _together(
     evidence, model, bare, road, untested, moved = _simulated(ready, model, tell)
     ready, notes = list(evidence.drives), notes + moved
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
+    notes += competing(found.arena.parts, ready)
     outcome = conclude(found, model)
     chosen = outcome.best.option.refit if outcome.best else None
     agreed = () if chosen is None else agreements(found, chosen)

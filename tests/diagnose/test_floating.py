@@ -45,3 +45,12 @@ def test_water_is_no_brake_that_is_not_logged():
     assert not any("brakes" in n for n in prepare(log, CAR, "a").notes)
     dry = changed(log, log.frame.select(s for s in log.frame.columns if "water" not in s))
     assert any("brakes" in n for n in prepare(dry, CAR, "a").notes)
+
+
+def test_water_that_is_hardly_judged_is_said():
+    """Without the note, no effect on such water reads as if it had been looked at."""
+    deep = tuple(replace(x, depth_left=4e-3, depth_right=4e-3) for x in LANES)
+    (note,) = (n for n in prepare(wet(lanes=deep), CAR, "a").notes if "on water" in n)
+    assert note.startswith("of 24 s on water 0 s are judged")
+    shallow = tuple(replace(x, depth_left=3e-4, depth_right=3e-4) for x in LANES)
+    assert not any("on water" in n for n in prepare(wet(lanes=shallow), CAR, "a").notes)

@@ -1,9 +1,11 @@
 """Where an effect begins in a drive: found from the response of another one, without a simulation of each moment."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from aqualog.diagnose.arena import arena_of
+from aqualog.diagnose.arena import Part, arena_of, competing
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import hypotheses, residual, signatures
 from aqualog.diagnose.search import simulated
@@ -40,6 +42,17 @@ def test_one_drive_has_its_own_moments_and_several_share_some():
     both = [one, prepare(plain(), CAR, "b")]
     starts = {h.fixed["start"] for h in hypotheses(both, Model())[0] if h.key == "pressure_loss@fl"}
     assert len(starts) == 5
+
+
+def test_drives_that_do_not_compete_are_said():
+    drives = [prepare(plain(), CAR, name) for name in "abc"]
+    stretch = slice(0, drives[0].mask.size)
+    parts = [
+        Part(i, stretch, np.zeros((1, 1)), drives[i].mask, ("kinematic",), np.zeros((1, 1, 1)), {}) for i in (0, 2)
+    ]
+    (note,) = competing(parts, drives)
+    assert note.endswith("up to 20 min together, decide between the causes; left out: b.")
+    assert competing([*parts, replace(parts[0], drive=1)], drives) == ()
 
 
 def test_a_ramp_and_two_intervals_are_where_they_are():

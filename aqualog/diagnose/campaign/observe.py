@@ -99,7 +99,7 @@ def _scenario(data: CampaignData, info: RunInfo) -> Scenario | str:
     told = info.run.values
     tyre = TYRES.get(str(told.get("tyre", "")))
     if tyre is None:
-        return f"tyre not known to the model: {told.get('tyre', 'not given')}"
+        return f"tyre not known to the model: {told.get('tyre', 'not given')}, it knows {', '.join(TYRES)}"
     front, rear = (told.get(f"pressure_{axle}_bar") for axle in ("front", "rear"))
     if not isinstance(front, float) or not isinstance(rear, float):
         return "the tyre pressures are not given"

@@ -154,5 +154,5 @@ def estimates(found: Refit, passes: Passes, weight: FloatArray) -> list[Estimate
     for (h, name), s, change in zip(names, sd.tolist(), found.theta.tolist(), strict=True):
         p = h.parameter(name)
         value, half = value_in(found.model, h, name), p.sigma * wide * math.hypot(s, DOUBT * change)
-        out.append(Estimate(value, value - half, value + half, p.unit))
+        out.append(Estimate(value, max(value - half, p.low), min(value + half, p.high), p.unit))
     return out
