@@ -178,14 +178,20 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
             notes.append(f"{unlogged}: brakes are not in the log, driven stretches are used")
     left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(logged, vehicle, dt) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
-    on_water = block_means((_depth(course) > 0.0).astype(np.float64), dt) > 0.0
-    water_s, judged_s = (float(x.sum()) * block_step(dt) for x in (on_water, on_water & mask))
-    if judged_s < LITTLE * water_s:
-        notes.append(f"of {water_s:.0f} s on water {judged_s:.0f} s are judged: in the rest a wheel may float")
+    notes += _judged_on_water(mask, course, dt)
     return Drive(
         name, dt, vehicle, course, speed, filled, channels, mask, _coordinates(filled, course, speed, v, dt), present,
         not torqued, n * dt, tuple(notes),
     )  # fmt: skip
+
+
+def _judged_on_water(mask: BoolArray, course: Course, dt: float) -> list[str]:
+    """A note where most of the water is left out: no effect there is not what the drive shows."""
+    on_water = block_means((_depth(course) > 0.0).astype(np.float64), dt) > 0.0
+    water_s, judged_s = (float(x.sum()) * block_step(dt) for x in (on_water, on_water & mask))
+    if judged_s >= LITTLE * water_s:
+        return []
+    return [f"of {water_s:.0f} s on water {judged_s:.0f} s are judged: in the rest a wheel may float"]
 
 
 def led_by(drive: Drive, model: Model) -> Drive:
