@@ -178,10 +178,9 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
             notes.append(f"{unlogged}: brakes are not in the log, driven stretches are used")
     left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(logged, vehicle, dt) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
-    notes += _judged_on_water(mask, course, dt)
     return Drive(
         name, dt, vehicle, course, speed, filled, channels, mask, _coordinates(filled, course, speed, v, dt), present,
-        not torqued, n * dt, tuple(notes),
+        not torqued, n * dt, (*notes, *_judged_on_water(mask, course, dt)),
     )  # fmt: skip
 
 
