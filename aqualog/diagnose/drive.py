@@ -113,8 +113,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         )  # fmt: skip
     vehicle = _as_known(vehicle, signals)
     columns = {s: signals.array(s) for s in present}
-    dt = signals.dt
-    n = signals.frame.height
+    dt, n = signals.dt, signals.frame.height
     notes = _silent(signals, present)
     velocity = _velocity(columns, vehicle, dt, present)
     gaps = np.zeros(n, dtype=bool)
@@ -162,12 +161,13 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     every_wheel, pressed = torqued and all(f"torque_{w}" in filled for w in WHEELS), filled.get("brake_pressure")
     if pressed is not None and not (every_wheel and inputs.brakes_in_torque(pressed, torque, v, vehicle, dt)):
         bad |= pressed > inputs.BRAKE_PRESSURE
-        notes += ["braking is left out: its torque is not in the log"] if torqued else []
+        notes.append("braking is left out: its torque is not in the log")
     if not torqued:
-        # a motor slows the car too, and presses no brake
-        slows = inputs.smooth(np.gradient(speed, dt), dt, inputs.SPEED_S) < -inputs.roll_out(v, vehicle) - ROLLS_OUT
-        bad |= slows | (np.gradient(speed, dt) > inputs.A_MOST)
-        notes.append("only driving and rolling out are used: the torque that slows the car is not known")
+        bad |= np.gradient(speed, dt) > inputs.A_MOST
+        # a motor slows the car too, and presses no brake; an accelerometer shows offsets and roads all the same
+        if not {"a_x", "brake_pressure"} <= filled.keys():
+            bad |= inputs.smooth(np.gradient(speed, dt), dt, inputs.SPEED_S) < -inputs.roll_out(v, vehicle) - ROLLS_OUT
+            notes.append("only driving and rolling out are used: the torque that slows the car is not known")
     elif "brake_pressure" not in filled:
         unlogged = "" if every_wheel else "the torque is that of one axle"
         wet = _widened(floats | (_depth(course) > 0.0), BESIDE_S, dt)

@@ -34,7 +34,9 @@ def test_torque_that_is_needed_meets_resistance_and_acceleration():
 
 @pytest.mark.parametrize("pressure", [None, 0.0], ids=["not logged", "a motor brakes"])
 def test_what_slows_the_car_is_left_out_of_a_log_without_torque(pressure):
-    log = signals(speed=((0.0, 30.0), (40.0, 30.0), (44.0, 18.0), (90.0, 18.0)), drop=TORQUES)
+    # where brakes are logged, an accelerometer shows roads and offsets while a motor brakes, too
+    drop = TORQUES if pressure is None else [*TORQUES, "a_x"]
+    log = signals(speed=((0.0, 30.0), (40.0, 30.0), (44.0, 18.0), (90.0, 18.0)), drop=drop)
     d = prepare(changed(log, log.frame.with_columns(brake_pressure=pl.lit(pressure, pl.Float64))), CAR, "a")
     assert not d.mask[405:435].any()
     assert d.mask[50:380].all()
