@@ -35,9 +35,14 @@ def with_each(together: Diagnosis, each: Mapping[str, Diagnosis], level: float) 
         return replace(together, notes=notes)
     causes = tuple(_of_some(found) for found in own.values())
     verdict: Verdict = "named" if len(causes) == 1 else "compound"
+    # its pictures come first
+    having = {n for found in own.values() for n, _ in found}
+    shown = [v for n in each if n in having for v in each[n].views]
+    views = (*shown, *(v for v in together.views if v.drive not in having))
     return replace(
-        together, verdict=verdict, sentence=verdict_sentence(verdict, causes, level=level), causes=causes, notes=notes
-    )
+        together, verdict=verdict, sentence=verdict_sentence(verdict, causes, level=level), causes=causes, notes=notes,
+        views=views,
+    )  # fmt: skip
 
 
 def _differs(cause: Cause) -> bool:

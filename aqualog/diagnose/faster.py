@@ -234,7 +234,7 @@ def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
             continue
         what = f"The wheel speed{place(f.wheel)} varies {_often(f.order)} per turn by {f.amplitude:.2%}"
         if f.kind == "speed":
-            out.append(f"{what}; {f.reason}: a resonance or the tyre, not the tone ring.")
+            out.append(f"{what}; {f.reason or 'not at all speeds'}: a resonance or the tyre, not the tone ring.")
         elif f.order > 1:
             out.append(f"{what} at all speeds: the tyre or the pick-up, not an eccentric ring.")
         elif f.amplitude < _AMPLITUDE.smallest:

@@ -95,7 +95,7 @@ def diagnose(
     names = found.drives if len(found.drives) <= MOST else ()
     if len(names) < 2 or found.verdict not in ("no_effect", "cannot_tell"):
         return found
-    own, plain = dict(drives), replace(options, views=False, consequences=False)
+    own, plain = dict(drives), replace(options, consequences=False)
     each = {}
     for k, name in enumerate(names):
         tell(f"{name} by itself", 0.9 + 0.1 * k / len(names))

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from aqualog.diagnose.agreement import contradicted, widened
@@ -88,11 +89,15 @@ def test_what_belongs_to_the_car_is_in_all_drives():
 
 def test_a_load_of_one_drive_is_named_with_the_drive():
     """A third of it in all three is what no drive confirms."""
-    d = diagnose(drives(0.0, 200.0, 0.0), CAR, options=replace(OPTIONS, surrogates=9))
+    d = diagnose(drives(0.0, 200.0, 0.0), CAR, options=replace(OPTIONS, surrogates=9, views=True))
     assert (d.verdict, [c.key for c in d.causes]) == ("named", ["payload_mass"])
     assert d.sentence.endswith("In drive 1 only.")
     assert d.causes[0].parameters["delta_mass"].value == pytest.approx(200.0, abs=40.0)
     assert any(n.startswith("drive 1 by itself: The car weighed") for n in d.notes)
+    first = next(v for v in d.views if v.channel == "force_balance")
+    assert first.drive == "drive 1"  # its pictures come first, with what the load explains
+    assert np.nanstd(first.after) < 0.9 * np.nanstd(first.before)
+    assert {v.drive for v in d.views} == {"drive 0", "drive 1", "drive 2"}
 
 
 def test_drives_that_share_an_effect_have_one_cause_with_their_mean():

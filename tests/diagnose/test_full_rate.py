@@ -179,6 +179,7 @@ def test_a_resonance_is_no_ring():
     assert "turns a second" in results["rr", 1].reason
     assert to_causes(tuple(results.values())) == ()
     assert "a resonance or the tyre" in remarks(tuple(results.values()))[0]
+    assert "; not at all" in remarks([replace(results["rr", 1], reason="")])[0]
 
 
 def test_one_speed_cannot_show_a_resonance():
