@@ -81,8 +81,7 @@ class ResistanceWatch:
     """Resistance measure, its offset on dry road, and its alarm.
 
     The trusted measure (n,) [m/s²] is shared as `MEASURE`, and as `HELD_BACK` where something holds the car back, or
-    where that is not known. Where a wheel or the slip slope suggests that this is not
-    dry road, the offset is frozen.
+    where that is not known. Where a wheel or the slip slope suggests that this is not dry road, the offset is frozen.
     """
 
     def __init__(self, setup: Setup) -> None:

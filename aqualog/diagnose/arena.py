@@ -242,7 +242,8 @@ def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, .
         c = list(columns)
         low = evidence.low[c]
         if h.effect.drive.divides:
-            low = low / (1.0 + low)  # where a straight line from the value of the file reaches a small one
+            least = h.parameter(h.free[0]).low
+            low = low * (least - low) / least  # where a straight line from the value at hand ends for the least one
         moments = MOMENTS if h.effect.drive.begins_like and "start" in h.fixed and len(evidence.drives) == 1 else 1
         out.append(
             Block(

@@ -20,16 +20,9 @@ from aqualog.model.follow import STEP_S, Led, led_along, shown
 from aqualog.model.term import Effect, Model, Need, Parameter, Term
 
 __all__ = [
-    "WORTH",
-    "Hypothesis",
-    "hypotheses",
-    "residual",
-    "signatures",
-    "simulated",
-    "value_in",
-    "with_free",
+    "WORTH", "Hypothesis", "hypotheses", "residual", "room_of", "signatures", "simulated", "value_in", "with_free",
     "with_values",
-]
+]  # fmt: skip
 
 TOLERANCE = 1.0 / 3.0  # of the smallest size worth naming, as standard deviation
 WORTH = 2.0  # tolerances
