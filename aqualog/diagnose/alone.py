@@ -5,6 +5,7 @@ One value is shared by all drives. A load or a wind of one of three is a third o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -55,7 +56,9 @@ def _of_some(found: Sequence[tuple[str, Cause]]) -> Cause:
     if len(found) == 1:
         return replace(first, sentence=first.sentence + only)
     bounds = {p.name: (p.low, p.high) for p in EFFECTS[first.effect].parameters}
-    values = {n: mean_of([c.parameters[n] for _, c in found], *bounds.get(n, (e.low, e.high)))
-              for n, e in first.parameters.items()}  # fmt: skip
+    values = {
+        n: mean_of([c.parameters[n] for _, c in found], *bounds[n]) if math.isfinite(e.low) else e
+        for n, e in first.parameters.items()
+    }
     sentence = cause_sentence(EFFECTS[first.effect], first.where, values) + only
     return replace(first, parameters=values, sentence=sentence, probability=min(c.probability for _, c in found))

@@ -103,18 +103,19 @@ def test_a_load_of_one_drive_is_named_with_the_drive():
 def test_drives_that_share_an_effect_have_one_cause_with_their_mean():
     def own(value, name):
         estimate = Estimate(value, value - 2.0, value + 2.0, "m/s")
-        cause = Cause("head_wind", None, {"speed": estimate}, (), "A head wind blew.", 0.96)
+        unsure = Estimate(3.0, np.nan, np.nan, "s")
+        cause = Cause("head_wind", None, {"speed": estimate, "begin": unsure}, (), "A head wind blew.", 0.96)
         return replace(nothing, verdict="named", causes=(cause,), drives=(name,), sentence=cause.sentence)
 
     nothing = Diagnosis("no_effect", "No effect.", ("a", "b", "c"), 300.0, 300.0, Model(), ())
     found = with_each(nothing, {"a": own(8.0, "a"), "b": nothing, "c": own(10.0, "c")}, 0.01)
     (cause,) = found.causes
     speed = cause.parameters["speed"]
-    assert (speed.value, speed.high - speed.low) == pytest.approx((9.0, 4.0 / 2.0**0.5))
+    assert (speed.value, speed.high - speed.low, cause.parameters["begin"].value) == pytest.approx((9.0, 8.0**0.5, 3.0))
     assert cause.sentence.endswith("In a and c only.")
     radius = Cause("tyre_radius", "fl", {"delta": Estimate(0.01, 0.009, 0.011, "-")}, (), "The tyre is larger.", 0.97)
-    car = with_each(nothing, {"a": replace(nothing, verdict="named", causes=(radius,), sentence="It is larger.")}, 0.01)
-    assert (car.verdict, car.notes) == ("no_effect", ("a by itself: It is larger.",))
+    larger = replace(nothing, verdict="named", causes=(radius,), sentence="It is larger.")
+    assert with_each(nothing, {"a": larger}, 0.01) == replace(nothing, notes=("a by itself: It is larger.",))
 
 
 def test_what_only_some_drives_have_contradicts_a_name_of_the_car():
