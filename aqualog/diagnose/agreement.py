@@ -1,7 +1,4 @@
-"""Several drives of the same car: do they agree on a value, and does the value of the others predict each drive?
-
-An effect that only one drive shows is not a property of the car: an open window, a head wind, a loaded boot.
-"""
+"""Several drives of the same car: do they agree on a value, and does the value of the others predict each drive?"""
 
 from __future__ import annotations
 
@@ -16,10 +13,10 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.records import AGREES, Agreement, ByDrive, Cause, Estimate
 from aqualog.diagnose.refit import KNOWN, PRIOR_WIDTH, Refit, metric
 from aqualog.diagnose.search import Found
-from aqualog.diagnose.words import cause_sentence, listed
+from aqualog.diagnose.words import cause_sentence
 from aqualog.model.effects import EFFECTS
 
-__all__ = ["agreements", "contradicted", "mean_of", "widened"]
+__all__ = ["agreements", "contradicted", "widened"]
 
 
 def agreements(found: Found, r: Refit) -> tuple[Agreement, ...]:
@@ -42,6 +39,8 @@ def agreements(found: Found, r: Refit) -> tuple[Agreement, ...]:
     gains = [0.5 * (_loss(g, x, -r.off) - _loss(g, x, o)) for g, x, o in zip(G, b, others, strict=True)]
     out = []
     for k, (h, name) in enumerate(r.names):
+        if h.drive:
+            continue  # nothing to agree on
         unit = h.parameter(name).unit
         values = r.values[k] + alone[:, k]
         half = Z95 * sd[:, k]
@@ -56,21 +55,13 @@ def agreements(found: Found, r: Refit) -> tuple[Agreement, ...]:
 
 
 def widened(cause: Cause, found: Sequence[Agreement]) -> Cause:
-    """The cause with intervals widened by Birge's ratio (K) where the drives differ more than their errors allow.
-
-    An effect that belongs to a drive may differ: if only some drives have it, it has their value and names them.
-    """
-    parameters, only = dict(cause.parameters), ""
+    """The cause with intervals widened by Birge's ratio (K) where the drives differ more than their errors allow."""
+    parameters = dict(cause.parameters)
     bounds = {p.name: (p.low, p.high) for p in EFFECTS[cause.effect].parameters}
     for a in found:
-        if a.key != cause.key or a.p_value >= AGREES or a.parameter not in parameters:
+        if cause.drives or a.key != cause.key or a.p_value >= AGREES or a.parameter not in parameters:
             continue
         low, high = bounds[a.parameter]
-        own = _having(cause, a)
-        if own:
-            parameters[a.parameter] = mean_of([d.alone for d in own], low, high)
-            only = f" In {listed([d.drive for d in own])} only."
-            continue
         e = parameters[a.parameter]
         ratio = math.sqrt(max(_heterogeneity([d.alone for d in a.drives]) / (len(a.drives) - 1), 1.0))
         half = 0.5 * (e.high - e.low) * ratio
@@ -78,7 +69,7 @@ def widened(cause: Cause, found: Sequence[Agreement]) -> Cause:
     if parameters == dict(cause.parameters):
         return cause
     sentence = cause_sentence(EFFECTS[cause.effect], cause.where, parameters)
-    return replace(cause, parameters=parameters, sentence=sentence + only)
+    return replace(cause, parameters=parameters, sentence=sentence)
 
 
 def contradicted(causes: Sequence[Cause], found: Sequence[Agreement]) -> bool:
@@ -87,24 +78,10 @@ def contradicted(causes: Sequence[Cause], found: Sequence[Agreement]) -> bool:
     neutral = {(c.effect, p.name): p.neutral for c in causes for p in EFFECTS[c.effect].parameters}
     return any(
         c.key in differ
+        and not c.drives
         and all(e.low <= neutral.get((c.effect, n), math.nan) <= e.high for n, e in c.parameters.items())
         for c in causes
     )
-
-
-def _having(cause: Cause, a: Agreement) -> list[ByDrive]:
-    """The drives that have an effect of a drive, if others do not; else none."""
-    effect = EFFECTS[cause.effect]
-    neutral = next(p.neutral for p in effect.parameters if p.name == a.parameter)
-    own = [d for d in a.drives if not d.alone.low <= neutral <= d.alone.high]
-    return own if effect.belongs in ("drive", "moment") and len(own) < len(a.drives) else []
-
-
-def mean_of(each: Sequence[Estimate], low: float, high: float) -> Estimate:
-    """Weighted mean with its interval, within bounds."""
-    weight = np.array([(2.0 * Z95 / (e.high - e.low)) ** 2 for e in each])
-    value, half = float(np.average([e.value for e in each], weights=weight)), Z95 / math.sqrt(float(weight.sum()))
-    return Estimate(min(max(value, low), high), max(value - half, low), min(value + half, high), each[0].unit)
 
 
 def _heterogeneity(each: Sequence[Estimate]) -> float:

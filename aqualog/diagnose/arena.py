@@ -178,7 +178,9 @@ def arena_of(evidence: Evidence, forces: Sequence[FloatArray]) -> Arena:
     for d, at in chosen:
         drive, signatures = evidence.drives[d], evidence.signatures[d][..., at]
         responses = {
-            h.key: signatures[c[0]] for h, c in zip(evidence.asked, evidence.columns, strict=True) if len(c) == 1
+            h.key: signatures[c[0]]
+            for h, c in zip(evidence.asked, evidence.columns, strict=True)
+            if len(c) == 1 and not h.drive
         }
         if forces:
             responses["unit_force"] = forces[d][:, at]
@@ -244,7 +246,8 @@ def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, .
         if h.effect.drive.divides:
             least = h.parameter(h.free[0]).low
             low = low * (least - low) / least  # where a straight line from the value at hand ends for the least one
-        moments = MOMENTS if h.effect.drive.begins_like and "start" in h.fixed and len(evidence.drives) == 1 else 1
+        is_sought = h.effect.drive.begins_like and "start" in h.fixed and (h.drive or len(evidence.drives) == 1)
+        moments = MOMENTS if is_sought else 1
         out.append(
             Block(
                 h.key, "effect", columns, np.eye(len(c)), math.log(KNOWN_PRIOR / places[h.effect.name] / moments), i,

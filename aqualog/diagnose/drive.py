@@ -200,7 +200,7 @@ def led_by(drive: Drive, model: Model) -> Drive:
     target wrong by a / FOLLOW_RATE: 0.2 m/s² of drag give 0.7 m/s, and the drag at that speed is 5 % off.
     """
     measured = replace(drive.course, v_x=drive.speed)
-    return replace(drive, course=_without_lag(measured, follow(drive.vehicle, measured, model)))
+    return replace(drive, course=_without_lag(measured, follow(drive.vehicle, measured, model.of(drive.name))))
 
 
 def rolling_under(drive: Drive, model: Model) -> Drive:

@@ -65,7 +65,8 @@ def make_evidence(
 ) -> Evidence:
     """Columns of all hypotheses about the model at hand."""
     columns: list[tuple[int, ...]] = []
-    variants = Counter((h.effect.name, h.where) for h in asked if not (h.allowed or h.effect.drive.begins_like))
+    sought = [h for h in asked if not (h.allowed or h.effect.drive.begins_like)]
+    variants = Counter((h.effect.name, h.where, h.drive) for h in sought)
     rows: list[tuple[float, ...]] = []
     kinds: list[Kind] = []
     # drag counts at this speed [m/s]: a head wind's v w is nearest to drag's v^2 by least squares there
@@ -74,7 +75,7 @@ def make_evidence(
     for h in asked:
         columns.append(tuple(range(len(rows), len(rows) + len(h.free))))
         # of one effect, which look much alike and together deviate by as much as one; moments do not
-        shared = 1.0 / math.sqrt(max(variants[h.effect.name, h.where], 1))
+        shared = 1.0 / math.sqrt(max(variants[h.effect.name, h.where, h.drive], 1))
         for name in h.free:
             p, now = h.parameter(name), value_in(model, h, name)
             spread = shared * math.hypot(day_to_day(h, name, car), deviation(h, name, car))

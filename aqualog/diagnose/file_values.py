@@ -37,11 +37,13 @@ def key_of(h: Hypothesis, name: str) -> str:
 def deviation(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
     """Standard deviation of the file's own value, in the unit of an effect's parameter; 0 where no key holds it.
 
-    The value of a key, of a known fault, or of both.
+    The value of a key, of a known fault, or of both. Every drive has it, no drive alone.
 
     A share of the value where the parameter multiplies it (`torque_gain`, `tyre_radius`), else in the key's unit.
     Differences between drives (`day_to_day`) are not in it, and independent of it.
     """
+    if h.drive:
+        return 0.0
     path, known = key_of(h, name), vehicle.known.get(h.key)
     fault = known.spread if known is not None and name == next(iter(known.values)) else 0.0
     if not path:

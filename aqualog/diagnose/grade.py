@@ -53,7 +53,7 @@ class Profile:
     drive is left out, because a constant could also be the accelerometer's offset.
 
     `rms` and `mean` [rad] with 95 % intervals; `shared`: correlation of the two channels over 150 m, NaN without
-    torque; `lap_m`: length after which the road repeats itself, None on one pass.
+    torque; `lap_m`: length after which the road repeats itself, None on one pass; `drive`: its name, of several.
     """
 
     s: FloatArray
@@ -63,6 +63,7 @@ class Profile:
     p_value: float
     shared: float
     lap_m: float | None
+    drive: str = ""
 
     @property
     def knots(self) -> Knots:
@@ -72,7 +73,7 @@ class Profile:
     @property
     def term(self) -> Term:
         """The profile as a term of a model of this drive."""
-        return Term(EMPIRICAL["unexplained_grade"], knots=self.knots)
+        return Term(EMPIRICAL["unexplained_grade"], knots=self.knots, drive=self.drive)
 
     @property
     def cause(self) -> Cause:
@@ -82,9 +83,11 @@ class Profile:
             text += f", and again after {self.lap_m:.0f} m"
         elif not np.isfinite(self.shared):
             text += "; with one pass and no torque, place and time cannot be distinguished"
-        text += f"; 95 % interval {self.rms.low:.1%} to {self.rms.high:.1%}."
+        where = f" In {self.drive}." if self.drive else ""
+        text += f"; 95 % interval {self.rms.low:.1%} to {self.rms.high:.1%}.{where}"
         values = {"grade_rms": self.rms, "grade_mean": self.mean}
-        return Cause("road_grade", None, values, ("kinematic",), text, self.probability)
+        drives = (self.drive,) if self.drive else ()
+        return Cause("road_grade", None, values, ("kinematic",), text, self.probability, drives)
 
     @property
     def probability(self) -> float:
@@ -99,7 +102,7 @@ class Profile:
 def with_profile(model: Model, profile: Profile) -> Model:
     """The model of a drive with its road, added to a profile that the model already has."""
     for i, t in enumerate(model.terms):
-        if t.effect is profile.term.effect:
+        if t.effect is profile.term.effect and t.drive == profile.drive:
             s = np.unique([x for x, _ in (*t.knots, *profile.knots)])
             both = sum(np.interp(s, *np.array(k).T) for k in (t.knots, profile.knots))
             knots = tuple(zip(s.tolist(), np.clip(both, -0.3, 0.3).tolist(), strict=True))

@@ -31,19 +31,22 @@ WORTH = 2.0  # tolerances
 OF_CHANGES, _OF_CHANGES = 0.02, ("velocity_scale", "accelerometer_gain")
 POWER_OF_SPEED = 4.0  # of the speed of full aquaplaning, with which the lost contact goes
 ROUGH_S = 1e-2  # [s] step that is enough for differences of simulations on dry road
+MOST_APART = 8  # drives that may each have an effect of their own
 MOST_LANES = 16  # that differ from each other; of more lanes, every 16th have a deviation in common
 
 
 @dataclass(frozen=True, slots=True)
 class Hypothesis:
     """One effect at one place. `free` parameters are sought, `fixed` ones have these values. `room`: tolerance in place
-    of the effect's own, where the log shows the effect less well or the vehicle file knows it better."""
+    of the effect's own, where the log shows the effect less well or the vehicle file knows it better. `drive`: name of
+    the only drive that has it, of several; empty: all of them."""
 
     effect: Effect
     where: str | None
     free: tuple[str, ...]
     fixed: Mapping[str, float] = field(default_factory=dict)
     room: float | None = None
+    drive: str = ""
 
     @property
     def allowed(self) -> bool:
@@ -106,7 +109,8 @@ class Hypothesis:
 def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis, ...], dict[str, str]]:
     """All hypotheses that these logs can test, and the reason why others cannot be tested, by name.
 
-    An effect that the model already has at a place is tested like any other: as a change of its value.
+    An effect that the model already has at a place is tested like any other: as a change of its value. Of several
+    drives each may have what belongs to a drive by itself: a load, a wind, a slope.
     """
     present = frozenset.intersection(*(d.present for d in drives))
     wet = any(d.course.lanes for d in drives)
@@ -116,13 +120,14 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     is_alone = "a_x" not in present and any(s.startswith("torque_") for s in present)
     has: dict[Need, bool] = {"water depth": wet, "wheel torque": torque, "wheel speeds": wheels}
     has["a_x or wheel torque"] = torque or "a_x" in present
-    length = max(d.duration_s for d in drives)
+    length, names = max(d.duration_s for d in drives), [d.name for d in drives]
+    apart = names if 1 < len(set(names)) == len(names) <= MOST_APART else []
     out: list[Hypothesis] = []
     untested: dict[str, str] = {}
     for effect in EFFECTS.values():
         if effect.drive.at_full_rate:
             continue
-        is_sought = bool(effect.drive.begins_like) and len(drives) == 1  # see `moments`
+        is_sought = bool(effect.drive.begins_like) and (len(drives) == 1 or bool(apart))  # see `moments`
         missing = next((need for need in effect.drive.needs if not has[need]), None)
         if missing is not None:
             lacks = "a_x beside the wheel torque" if is_alone and "torque" in missing else missing
@@ -138,7 +143,9 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             untested[f"{effect.name}@steer_angle"] = "no residual compares the steering with the car's turning"
         for where in () if is_sought else asked:
             room = room_of(effect, where, drives[0].vehicle, wheels=wheels)
-            out += [Hypothesis(effect, where, free, fixed, room) for fixed in effect.drive.variants(length)]
+            alone = apart if effect.belongs == "drive" and where not in (*WHEELS, *AXLES) else []
+            variants = effect.drive.variants(length)
+            out += [Hypothesis(effect, where, free, fixed, room, n) for n in ("", *alone) for fixed in variants]
     out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(() if torque else (STAND_IN,)))]
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
     # without torque there is no drag to test, nor one that differs
@@ -185,12 +192,16 @@ def with_values(model: Model, found: Sequence[tuple[Hypothesis, Mapping[str, flo
     for h, values in found:
         own = {**h.fixed, **values}
         for i, t in enumerate(terms):
-            if t.effect is h.effect and t.place == (h.where or h.effect.default):
-                terms[i] = Term(h.effect, {**t.values, **own}, h.where)
+            if _is_of(t, h):
+                terms[i] = Term(h.effect, {**t.values, **own}, h.where, drive=h.drive)
                 break
         else:
-            terms.append(Term(h.effect, own, h.where))
+            terms.append(Term(h.effect, own, h.where, drive=h.drive))
     return Model(tuple(terms))
+
+
+def _is_of(t: Term, h: Hypothesis) -> bool:
+    return t.effect is h.effect and t.place == (h.where or h.effect.default) and t.drive == h.drive
 
 
 def with_free(model: Model, members: Sequence[Hypothesis], values: FloatArray) -> Model:
@@ -202,7 +213,7 @@ def with_free(model: Model, members: Sequence[Hypothesis], values: FloatArray) -
 def value_in(model: Model, h: Hypothesis, name: str) -> float:
     """Value of a parameter in a model; neutral if it has no such term."""
     for t in model.terms:
-        if t.effect is h.effect and t.place == (h.where or h.effect.default):
+        if _is_of(t, h):
             return float(t.values.get(name, h.parameter(name).neutral))
     return h.parameter(name).neutral
 
@@ -222,6 +233,7 @@ def simulated(
     drive: Drive, model: Model, *, step: float = STEP_S, like: Led | None = None
 ) -> dict[str, FloatArray]:  # fmt: skip
     """Signals of the drive as the simulation has them under a model, those that the log has alone. Each (n,)"""
+    model = model.of(drive.name)
     if any(t.place == "v_x" for t in model.terms):
         drive, like = led_by(drive, model), None
     led = led_along(drive.vehicle, drive.course, model, step=step, like=like)
@@ -243,9 +255,11 @@ def signatures(
 
     Computed from differences of simulations along the drive. To first order, a hypothesis of a whole axle or car is the
     sum of its wheels; unless `each` is set, it is not simulated again. The tolerance of a lane is what its effect does
-    there. On dry road longer steps than those of `base` do: a difference of two simulations is exact to 1 % with them.
+    there. What another drive alone has changes nothing. On dry road longer steps than those of `base` do: a difference
+    of two simulations is exact to 1 % with them.
     """
     # the force in a tie rod jumps with the torque
+    model = model.of(drive.name)
     is_rough = not drive.course.lanes and not drive.course.has_rods
     is_rough &= not any(t.effect.drive.is_quick for t in model.terms)
     leads = any(t.place == "v_x" for t in model.terms)
@@ -275,21 +289,28 @@ def signatures(
         tick()
         return np.array(out)
 
-    alone = {
-        (h.effect.name, h.where, tuple(h.fixed.items())): h for h in asked if h.lane is None and (each or not h.parts)
-    }
+    own = [h for h in asked if h.drive in ("", drive.name)]
+    has = {t.effect.name for t in model.terms}
+
+    def at(h: Hypothesis, where: str | None) -> tuple[str, str | None, tuple[tuple[str, float], ...], str]:
+        """What one drive alone has changes it like what all have, unless one of them is there already."""
+        return h.effect.name, where, tuple(h.fixed.items()), h.drive if h.effect.name in has else ""
+
+    alone = {at(h, h.where): h for h in own if h.lane is None and (each or not h.parts or at(h, h.where)[-1])}
     sources = {e.name: at for at, e in LANE_TOLERANCES.items()}
     for name, where in {sources[h.effect.name] for h in asked if h.lane is not None}:
         source = Hypothesis(EFFECTS[name], where, (EFFECTS[name].parameters[0].name,))
-        alone.setdefault((name, where, ()), source)
+        alone.setdefault((name, where, (), ""), source)
     done = dict(zip(alone, beside(one, alone.values()), strict=True))
     number = stretches(drive)
 
     def of(h: Hypothesis) -> FloatArray:
         if h.lane is not None:
             there = (number > 0) & ((number - 1) % MOST_LANES == h.lane)
-            return np.asarray(done[*sources[h.effect.name], ()][:1] * there)
-        places = (h.where,) if each or not h.parts else h.parts
-        return np.asarray(np.sum([done[h.effect.name, w, tuple(h.fixed.items())] for w in places], axis=0))
+            return np.asarray(done[*sources[h.effect.name], (), ""][:1] * there)
+        if h.drive not in ("", drive.name):
+            return np.zeros((len(h.free), *base.shape))
+        places = (h.where,) if at(h, h.where) in done else h.parts
+        return np.asarray(np.sum([done[at(h, w)] for w in places], axis=0))
 
     return [of(h) for h in asked]

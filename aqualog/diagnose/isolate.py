@@ -73,7 +73,7 @@ def limits(evidence: Evidence, sizes: FloatArray) -> tuple[Limit, ...]:
     """Detection limit of each effect and place, by its first parameter."""
     out: dict[str, Limit] = {}
     for h, columns in zip(evidence.asked, evidence.columns, strict=True):
-        if h.allowed:
+        if h.allowed or h.drive:
             continue
         size = float(sizes[columns[0]])
         old = out.get(h.key)
@@ -90,7 +90,8 @@ def confusions(evidence: Evidence, gram: FloatArray, sizes: FloatArray) -> tuple
     G = gram[:-1, :-1]
     seen = [
         i for i, c in enumerate(evidence.columns)
-        if math.isfinite(sizes[c[0]]) and len(c) == 1 and not evidence.asked[i].allowed
+        if math.isfinite(sizes[c[0]]) and len(c) == 1
+        and not (evidence.asked[i].allowed or evidence.asked[i].drive)
     ]  # fmt: skip
     first: dict[str, int] = {}
     for i in seen:

@@ -31,8 +31,9 @@ CLEARLY = 1.0  # [nats (natural logarithm)] that it must be more likely than no 
 
 
 def of_water(evidence: Evidence) -> list[int]:
-    """Effects of water on the whole car or a side."""
-    return [i for i, h in enumerate(evidence.asked) if h.of_water and not h.allowed and h.where not in AXLES]
+    """Effects of water on the whole car or a side, in all drives."""
+    whole = (h.of_water and not h.allowed and h.where not in AXLES and not h.drive for h in evidence.asked)
+    return [i for i, is_whole in enumerate(whole) if is_whole]
 
 
 class _Tried(NamedTuple):

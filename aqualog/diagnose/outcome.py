@@ -133,7 +133,9 @@ def _cause(
     for name, value in h.fixed.items():
         if name in {p.name for p in h.effect.parameters} and name not in parameters:
             parameters[name] = Estimate(float(value), math.nan, math.nan, h.parameter(name).unit)
-    return Cause(h.effect.name, h.where, parameters, explains, cause_sentence(h.effect, h.where, parameters)), large
+    drives = (h.drive,) if h.drive else ()
+    sentence = cause_sentence(h.effect, h.where, parameters, drives)
+    return Cause(h.effect.name, h.where, parameters, explains, sentence, drives=drives), large
 
 
 def _is_gain(found: Found, r: Refit | None) -> bool:
@@ -168,7 +170,8 @@ def with_causes(model: Model, causes: Sequence[Cause], asked: Sequence[Hypothesi
     for c in causes:
         values = {n: e.value for n, e in c.parameters.items()}
         for h in asked:
-            if h.key == c.key and set(h.free) <= set(values) and all(values.get(n, v) == v for n, v in h.fixed.items()):
+            is_it = (h.key, (h.drive,) if h.drive else ()) == (c.key, c.drives)
+            if is_it and set(h.free) <= set(values) and all(values.get(n, v) == v for n, v in h.fixed.items()):
                 found.append((h, {n: values[n] for n in h.free}))
                 break
     return with_values(model, found)

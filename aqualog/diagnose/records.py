@@ -38,7 +38,7 @@ class Estimate:
 @dataclass(frozen=True, slots=True)
 class Cause:
     """One effect that the measurement requires. `explains`: residual channels whose error it reduces; `probability`
-    that the effect is there, NaN where no competition was held."""
+    that the effect is there, NaN where no competition was held; `drives`: those that alone have it, of several."""
 
     effect: str
     where: str | None
@@ -46,6 +46,7 @@ class Cause:
     explains: tuple[str, ...]
     sentence: str
     probability: float = float("nan")
+    drives: tuple[str, ...] = ()
 
     @property
     def key(self) -> str:

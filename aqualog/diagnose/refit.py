@@ -112,10 +112,12 @@ def metric(
     evidence = arena.evidence
     apart = np.zeros(evidence.count)
     apart[list(beside)] = evidence.as_values[list(beside)]
-    sought = {evidence.kinds[c] for c in beside} - {""}
-    known = np.where([k in sought for k in evidence.kinds], 0.0, evidence.spread)
-    known[list(beside)] = 0.0
     owner = {c: h for h, columns in zip(evidence.asked, evidence.columns, strict=True) for c in columns}
+    kinds = [(kind, owner[c].drive) for c, kind in enumerate(evidence.kinds)]
+    sought = [kinds[c] for c in beside if kinds[c][0]]
+    alike = [any(kind == k and (not d or not o or d == o) for k, o in sought) for kind, d in kinds]
+    known = np.where(alike, 0.0, evidence.spread)
+    known[list(beside)] = 0.0
     shares = np.array([share if owner[c].lane is None else 1.0 for c in range(evidence.count)])
     sd = np.maximum(shares * evidence.tolerance, known)
     k = np.flatnonzero(sd > 0.0)

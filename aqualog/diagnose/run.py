@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +14,6 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, contradicted, widened
-from aqualog.diagnose.alone import MOST, with_each
 from aqualog.diagnose.any_effect import SURROGATES
 from aqualog.diagnose.arena import competing
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
@@ -50,6 +49,7 @@ LEAST_CORRELATION = 0.5
 LEAST_GAIN, MOST_GAIN = 0.5, 1.5  # bounds of an accelerometer's gain
 LEAST_MOTION = 0.1  # [m/s^2] sd of the change of the acceleration
 _WET = "Laws of water differ by that much; `aqualog calibrate --wet` fits one to the car's own passes."
+_SHARED = "The extended model has what all drives share, not what some have alone."
 # least share of the promised gain that held-out drives keep, which is 0 for an effect of half the size: 58 right names
 # kept 0.13 to 1.8 of it, two wrong ones beside measured noise -0.3 and 0.0 (S)
 KEPT = 0.1
@@ -91,23 +91,7 @@ def diagnose(
         If no drive can be used.
     """
     options, tell = options or Options(), progress or (lambda _text, _share: None)
-    found = _together(drives, vehicle, model or Model(), holdout, options, tell)
-    names = found.drives if len(found.drives) <= MOST else ()
-    if len(names) < 2 or found.verdict not in ("no_effect", "cannot_tell"):
-        return found
-    own, plain = dict(drives), replace(options, consequences=False)
-    each = {}
-    for k, name in enumerate(names):
-        tell(f"{name} by itself", 0.9 + 0.1 * k / len(names))
-        each[name] = _together([(name, own[name])], vehicle, model or Model(), (), plain, lambda _t, _s: None)
-    return with_each(found, each, options.level)
-
-
-def _together(
-    drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, given: Model, holdout: Sequence[tuple[str, Signals]],
-    options: Options, tell: Tell,
-) -> Diagnosis:  # fmt: skip
-    """One competition over all drives."""
+    given = model or Model()
     model = with_known(given, vehicle)
     tell("preparing", 0.0)
     ready, notes = _prepared(drives, vehicle)
@@ -116,7 +100,7 @@ def _together(
         return _not_testable(ready, model, reason, notes, vehicle)
     if model.terms:
         ready = [led_by(d, model) for d in ready]
-    evidence, model, bare, road, untested, moved = _simulated(ready, model, tell)
+    evidence, model, bare, roads, untested, moved = _simulated(ready, model, tell)
     ready, notes = list(evidence.drives), notes + moved
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     notes += competing(found.arena.parts, ready)
@@ -130,9 +114,10 @@ def _together(
         outcome = outcome._replace(verdict="cannot_tell", certain=frozenset(), notes=(*outcome.notes, why))
     quiet = evidence.residuals if chosen is None else chosen.residuals
     noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, ready, strict=True)]
-    if road is not None:
-        named_too = _extended(outcome, chosen, (), bare, evidence.asked)
-        outcome = _with_road(outcome, _beside_causes(ready[0], named_too) or road)
+    named_too = _extended(outcome, chosen, (), bare, evidence.asked)
+    for d in ready:
+        if d.name in roads:
+            outcome = _with_road(outcome, _road(d, named_too, roads[d.name].drive) or roads[d.name])
     is_named = any(c.effect == "road_grade" and "grade_rms" in c.parameters for c in outcome.causes)
     extended = _extended(outcome, chosen, found.forms, model if is_named else bare, evidence.asked)
     names = {d.name for d in ready}
@@ -141,7 +126,7 @@ def _together(
     shared = tolerant(evidence, COARSE * found.plain)
     least = isolate.likelier_than_none(evidence, found.arena.blocks, shared)
     sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.threshold, least)
-    before = [residual(d, model) for d in ready] if road is None else [_led(d, bare) for d in ready]
+    before = [_led(d, bare) if d.name in roads else residual(d, model) for d in ready]
     differs, is_unclear = extended.terms != bare.terms, outcome.verdict == "cannot_tell"
     alone, settled, after = _at_likeliest(found, evidence, bare, extended) if differs else (bare, extended, before)
     tell("searching for a run that distinguishes the causes" if is_unclear else "measuring the gain", 0.8)
@@ -173,12 +158,12 @@ def _together(
         remainders=forms,
         manoeuvre=next_run,
         gain=gained,
-        model=with_rings(extended, seen),
+        model=with_rings(extended, seen).of(""),
         deviations=tuple(t for t in settled.terms if t not in extended.terms),
         channels=ready[0].channels,
         untested=untested | seen.untested,
-        notes=(*notes, *outcome.notes, *seen.notes),
-        views=_views(ready, before, after) if options.views else (),
+        notes=(*notes, *outcome.notes, *seen.notes, *((_SHARED,) if any(c.drives for c in outcome.causes) else ())),
+        views=_views(ready, before, after, {n for c in outcome.causes for n in c.drives}) if options.views else (),
         agreement=tuple(a for a in agreed if a.key in named),
         caution=not_calibrated(vehicle),
     )
@@ -186,15 +171,17 @@ def _together(
 
 def _simulated(
     ready: list[Drive], model: Model, tell: Tell
-) -> tuple[Evidence, Model, Model, Profile | None, dict[str, str], tuple[str, ...]]:
-    """Evidence, model, model without the road, road, effects that are not tested, and notes: the road of a single drive
+) -> tuple[Evidence, Model, Model, dict[str, Profile], dict[str, str], tuple[str, ...]]:
+    """Evidence, model, model without roads, roads by drive, effects that are not tested, and notes: each drive's road
     first, then the effects, around values that the file is not sure of."""
     bare = model
     notes: tuple[str, ...] = ()
-    road = find_profile(ready[0], residual(ready[0], model)) if len(ready) == 1 else None
-    if road is not None:
+    found = {d.name: _road(d, model, d.name if len(ready) > 1 else "") for d in ready}
+    roads = {n: road for n, road in found.items() if road is not None}
+    for road in roads.values():
         # named or not: a car needs more torque uphill, and the torque would appear to be the cause
         model = with_profile(model, road)
+    if roads:
         ready = [led_by(d, model) for d in ready]
     asked, untested = hypotheses(ready, model)
     evidence = simulated(ready, asked, model, tell)
@@ -208,7 +195,7 @@ def _simulated(
     evidence, water = around_water(evidence, model)
     if water is not None and water.effect.belongs == "tyre" and not ready[0].vehicle.water:
         notes += (f"On water the drive is likeliest with {term_words(water)}. {_WET}",)
-    return supported(evidence), model, bare, road, untested, notes
+    return supported(evidence), model, bare, roads, untested, notes
 
 
 def _gained(
@@ -220,7 +207,7 @@ def _gained(
     own = {id(t) for t in models[0].terms}  # a road is this drive's own
 
     def elsewhere(m: Model) -> Model:
-        return Model(tuple(t for t in m.terms if id(t) in own or t.effect.name != "unexplained_grade"))
+        return Model(tuple(t for t in m.of("").terms if id(t) in own or t.effect.name != "unexplained_grade"))
 
     unseen = _prepared(holdout, vehicle)[0] if holdout else []
     unseen = [d for d in unseen if d.channels == ready[0].channels]
@@ -273,10 +260,11 @@ def _led(drive: Drive, model: Model) -> FloatArray:
     return residual(led_by(drive, model), model)
 
 
-def _beside_causes(drive: Drive, model: Model) -> Profile | None:
-    """The road in what a model without it leaves: a force that has a name is no slope."""
+def _road(drive: Drive, model: Model, name: str) -> Profile | None:
+    """The road in what a model leaves, of a drive by its `name`: a force that has a name is no slope."""
     led = led_by(drive, model)
-    return find_profile(led, residual(led, model))
+    road = find_profile(led, residual(led, model))
+    return None if road is None else replace(road, drive=name)
 
 
 def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
@@ -288,7 +276,8 @@ def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
         return outcome._replace(notes=(*outcome.notes, f"{why}: {cause.sentence}"))
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
         # one road: a constant slope is its mean, whose interval knows that it is an offset as well
-        outcome = outcome._replace(causes=tuple(c for c in outcome.causes if c.effect != cause.effect))
+        mean = (cause.effect, cause.drives)
+        outcome = outcome._replace(causes=tuple(c for c in outcome.causes if (c.effect, c.drives) != mean))
     is_sure = outcome.verdict != "cannot_tell" or "accelerometer_bias" in outcome.certain
     # an offset of the accelerometer has the constant that a mean would repeat
     if is_sure and any(c.effect == "accelerometer_bias" for c in outcome.causes):
@@ -388,13 +377,14 @@ def _not_testable(
 
 
 def _views(
-    drives: Sequence[Drive], before: Sequence[FloatArray], after: Sequence[FloatArray]
+    drives: Sequence[Drive], before: Sequence[FloatArray], after: Sequence[FloatArray], first: Container[str]
 ) -> tuple[ResidualView, ...]:
-    """Residuals of each drive by channel, without what is left out."""
+    """Residuals of each drive by channel, without what is left out; drives that alone have a cause come `first`."""
+    each = sorted(zip(drives, before, after, strict=True), key=lambda x: x[0].name not in first)
     return tuple(
         ResidualView(
             d.name, c, CHANNELS[c].title, CHANNELS[c].unit, block_step(d.dt), d.coordinates,
             *(np.where(d.mask, x[i], np.nan) for x in own),
         )
-        for d, *own in zip(drives, before, after, strict=True) for i, c in enumerate(d.channels)
+        for d, *own in each for i, c in enumerate(d.channels)
     )  # fmt: skip

@@ -98,10 +98,14 @@ def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model
     for d in drives:
         residuals.append(residual(d, model))
         all_signatures.append(signatures(d, model, asked, base=residuals[-1], tick=tick))
-    if len(drives) == 1:
-        begun = moments(drives[0], residuals[0], asked, all_signatures[0])
-        all_signatures[0] += signatures(drives[0], model, begun, base=residuals[0])
-        asked = (*asked, *begun)
+    begun = [
+        h if len(drives) == 1 else replace(h, drive=d.name)
+        for d, r, s in zip(drives, residuals, all_signatures, strict=True)
+        for h in (moments(d, r, asked, s) if len(drives) == 1 or any(h.drive for h in asked) else ())
+    ]
+    for d, r, s in zip(drives, residuals, all_signatures, strict=True):
+        s += signatures(d, model, begun, base=r)
+    asked = (*asked, *begun)
     return make_evidence(drives, asked, residuals, all_signatures, model)
 
 
@@ -233,7 +237,8 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     def as_blocks(own: Sequence[int]) -> Members:
         return tuple(sorted(by_hypothesis[h] for h in own)) if all(h in by_hypothesis for h in own) else ()
 
-    chosen += [as_blocks(own) for own in _twins(evidence, _effects(arena, best)) + [(i,) for i in of_water(evidence)]]
+    of_one = [(i,) for i in of_water(evidence)]
+    chosen += [as_blocks(own) for own in _twins(evidence, _effects(arena, best)) + of_one]
     for own in imitations(evidence.asked, _effects(arena, best)):
         if compatible(evidence, own):
             equal.add(as_blocks(own))
@@ -380,6 +385,7 @@ def _twins(evidence: Evidence, own: Sequence[int]) -> list[tuple[int, ...]]:
             for i, h in enumerate(evidence.asked):
                 members = tuple(sorted((*own[:k], i, *own[k + 1 :])))
                 at_usual_place = h.effect.name == name and h.where in (None, h.effect.default)
+                at_usual_place &= h.drive == evidence.asked[m].drive
                 if at_usual_place and len(set(members)) == len(members) and compatible(evidence, members):
                     out.append(members)
     return out

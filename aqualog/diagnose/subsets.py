@@ -39,22 +39,25 @@ def compatible(evidence: Evidence, members: Sequence[int]) -> bool:
     Delays are relative: a delay of all signals that are compared with each other only shifts the start of their clock,
     and one of all but one signal is that signal's own, with the other sign. Those of turning are apart from the others.
     """
-    for effect in {evidence.asked[m].effect.name for m in members if evidence.asked[m].effect.drive.is_relative}:
-        late = {evidence.asked[m].where for m in members if evidence.asked[m].effect.name == effect}
+    own = [evidence.asked[m] for m in members]
+    for effect, drive in {(h.effect.name, h.drive) for h in own if h.effect.drive.is_relative}:
+        late = {h.where for h in own if h.effect.name == effect and h.drive in ("", drive)}
         every = {h.where for h in evidence.asked if h.effect.name == effect}
         for compared in (every & TURNING, every - TURNING):
             if len(late & compared) > 1 and len(late & compared) >= len(compared) - 1:
                 return False
-    seen: set[tuple[str, str]] = set()
-    for m in members:
-        h = evidence.asked[m]
+    seen: set[tuple[str, str, str]] = set()
+    shared = {h.effect.name for h in own if not h.drive}
+    for h in own:
+        if h.drive and h.effect.name in shared:
+            return False  # what all drives have, and what each has besides, would differ by one value only
         # a load at the front and one removed at the rear are not two loads, but a shift of the centre of mass
         whole = h.where is None or h.effect.drive.is_single
         places = WHEELS if whole else AXLES.get(h.where or "", (h.where or "",))
         for p in places:
-            if (h.effect.name, p) in seen:
+            if (h.effect.name, p, h.drive) in seen:
                 return False
-            seen.add((h.effect.name, p))
+            seen.add((h.effect.name, p, h.drive))
     return True
 
 
@@ -68,7 +71,7 @@ def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tupl
     for relation in [(e.name, *others) for e in EFFECTS.values() for others in e.drive.equals]:
         usual = {
             h.effect.name: i for i, h in enumerate(asked)
-            if h.effect.name in relation and h.where in (None, h.effect.default)
+            if h.effect.name in relation and h.where in (None, h.effect.default) and not h.drive
         }  # fmt: skip
         related = {i for i in members if i in usual.values()}
         if not related or len(usual) < len(relation):

@@ -103,8 +103,9 @@ def decided(
     own = _with_probability(best.large, marginal)
     # the same effects at other places that explain the log as well, or nearly so
     near = [c for s in group if s.share * CREDIBLE > group[0].share for c in s.large]
-    here = {c.key for c in best.large}
-    notes = _small(best) + tuple(dict.fromkeys(f"Equally possible: {c.sentence}" for c in near if c.key not in here))
+    here = {(c.key, c.drives) for c in best.large}
+    elsewhere = [c.sentence for c in near if (c.key, c.drives) not in here]
+    notes = _small(best) + tuple(dict.fromkeys(f"Equally possible: {s}" for s in elsewhere))
     failed = failing(best)
     unsure = frozenset(c.effect for c in own if c.probability < SURE)
     if not unsure and not failed:

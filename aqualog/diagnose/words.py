@@ -46,8 +46,10 @@ def term_words(term: Term) -> str:
     return f"{name_of(term.effect.name, term.where)}: {', '.join(said)}"
 
 
-def cause_sentence(effect: Effect, where: str | None, parameters: Mapping[str, Estimate]) -> str:
-    """The effect's own sentence with its values and the interval of the first one."""
+def cause_sentence(
+    effect: Effect, where: str | None, parameters: Mapping[str, Estimate], drives: Sequence[str] = ()
+) -> str:  # fmt: skip
+    """The effect's own sentence with its values and the interval of the first one; `drives` that alone have it."""
     name, first = next(iter(parameters.items()))
     values = {n: e.value for n, e in parameters.items()}
     low, high, unit = first.low, first.high, first.unit
@@ -59,8 +61,9 @@ def cause_sentence(effect: Effect, where: str | None, parameters: Mapping[str, E
     if any(n == name and (spec or "").endswith("%") for _, n, spec, _ in Formatter().parse(sentence)):
         # in the unit in which the sentence has the value
         low, high, unit = 100.0 * low, 100.0 * high, "%"
+    only = f" In {listed(drives)} only." if drives else ""
     told = "" if unit == "-" else f" {displayed_unit(unit)}"
-    return f"{text}{'' if '{where}' in sentence else place(where)}; 95 % interval {_span(low, high)}{told}."
+    return f"{text}{'' if '{where}' in sentence else place(where)}; 95 % interval {_span(low, high)}{told}.{only}"
 
 
 def _span(low: float, high: float) -> str:
@@ -93,7 +96,7 @@ def verdict_sentence(
     `certain`: effects that are certain where others cannot be distinguished; `seen`: the test's p-value where it
     found more than noise; `source`: `log` or `campaign`; `untested`: effects that the log cannot show, and why.
     """
-    names = [name_of(c.effect, c.where) for c in causes]
+    names = [name_of(c.effect, c.where) + (f" in {listed(c.drives)}" if c.drives else "") for c in causes]
     if verdict == "no_effect" and seen is not None:
         return f"No effect is named: more than noise is left (p = {seen:.2g}), but no known effect explains it clearly."
     if verdict == "no_effect":

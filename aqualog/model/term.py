@@ -202,7 +202,8 @@ class Effect:
 class Term:
     """An effect with values; parameters that are not named keep their neutral value.
 
-    `knots` (x, value) are for an effect with a table; without knots, or with all values zero, it is neutral.
+    `knots` (x, value) are for an effect with a table; without knots, or with all values zero, it is neutral. `drive`:
+    name of the only drive that has it; empty: every drive.
 
     Raises
     ------
@@ -214,6 +215,7 @@ class Term:
     values: Mapping[str, float] = field(default_factory=dict)
     where: str | None = None
     knots: Knots = ()
+    drive: str = ""
 
     def __post_init__(self) -> None:
         known = {p.name: p for p in self.effect.parameters}
@@ -276,10 +278,16 @@ class Model:
         ConfigError
             If the same effect sits at the same place already.
         """
-        if any(t.effect is term.effect and t.place == term.place for t in self.terms):
+        if any((t.effect, t.place, t.drive) == (term.effect, term.place, term.drive) for t in self.terms):
             place = f" at {term.place}" if term.place else ""
             raise ConfigError(f"{term.effect.name}{place} is in the model already", hint="one term with the sum")
         return Model((*self.terms, term))
+
+    def of(self, drive: str) -> Model:
+        """Return the model of a drive by its name, without the terms of others; of no name: what all drives share."""
+        if all(t.drive in ("", drive) for t in self.terms):
+            return self
+        return Model(tuple(t for t in self.terms if t.drive in ("", drive)))
 
     def apply(self, setup: Setup) -> Setup:
         """Return the setup with all terms in it."""

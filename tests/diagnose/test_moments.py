@@ -30,7 +30,7 @@ def test_a_tyre_that_loses_its_air(where, start, duration):
     assert h.free == ("radius",)
 
 
-def test_one_drive_has_its_own_moments_and_several_share_some():
+def test_each_drive_has_its_own_moments():
     one = prepare(plain(), CAR, "a")
     few = [h for h in hypotheses([one], Model())[0] if h.effect.name in ("tyre_radius", "aero_drag")]
     evidence = simulated([one], few, Model(), lambda _t, _s: None)
@@ -40,8 +40,16 @@ def test_one_drive_has_its_own_moments_and_several_share_some():
     prior = {b.key: b.log_prior for b in arena_of(evidence, ()).blocks}
     assert prior["pressure_loss@fl"] == pytest.approx(np.log(0.03 / 40.0))
     both = [one, prepare(plain(), CAR, "b")]
-    starts = {h.fixed["start"] for h in hypotheses(both, Model())[0] if h.key == "pressure_loss@fl"}
-    assert len(starts) == 5
+    of_both = [h for h in hypotheses(both, Model())[0] if h.effect.name in ("tyre_radius", "payload_mass")]
+    evidence = simulated(both, of_both, Model(), lambda _t, _s: None)
+    begun = [(i, h) for i, h in enumerate(evidence.asked) if h.key == "pressure_loss@fl"]
+    assert [h.drive for _, h in begun] == ["a", "b"]
+    for i, h in begun:  # what one drive has shows in it alone
+        sizes = [np.abs(s[list(evidence.columns[i])]).max() for s in evidence.signatures]
+        assert [x > 0.0 for x in sizes] == [h.drive == "a", h.drive == "b"]
+    own = [b for b in arena_of(evidence, ()).blocks if b.key == "payload_mass"]
+    assert len(own) == 3  # in both, in each
+    assert sum(np.exp(b.log_prior) for b in arena_of(evidence, ()).blocks if "payload" in b.key) == pytest.approx(0.03)
 
 
 def test_drives_that_do_not_compete_are_said():

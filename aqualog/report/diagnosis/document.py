@@ -106,6 +106,7 @@ def _cause(c: Cause) -> dict[str, Any]:
         **fields_of(c, "effect", "where", "key"),
         "parameters": {name: _estimate(e) for name, e in c.parameters.items()},
         **fields_of(c, "explains", "sentence", "probability"),
+        "drives": list(c.drives),
     }
 
 
