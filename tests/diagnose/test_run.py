@@ -312,6 +312,17 @@ def test_a_force_with_a_name_is_no_slope_of_the_road(monkeypatch):
     assert mean.low < road.grid[:, 1].mean() < mean.high
 
 
+def test_the_road_of_one_of_two_drives(monkeypatch):
+    ask(monkeypatch, ("payload_mass", "road_grade"))
+    flat = Spec("mixed", "gusts", (), 8, "compact_fwd", holdout=0)
+    (_, a), (_, b) = (make_case(s).drives[0] for s in (flat, replace(flat, programme="hilly")))
+    d = diagnose([("a", a), ("b", b)], CARS["compact_fwd"], options=QUICK)
+    assert [(c.key, c.drives) for c in d.causes] == [("road_grade", ("b",))]
+    assert d.sentence.endswith("In b.")
+    assert not d.model.terms  # another drive is elsewhere
+    assert any(n.startswith("The extended model has what all drives share") for n in d.notes)
+
+
 def test_half_of_the_slip_slope_is_named_though_a_straight_line_leaves_nothing_of_it(monkeypatch):
     ask(monkeypatch, [f"{e}@{at}" for e in ("slip_stiffness", "slip_stiffness_drift") for at in ("rl", "rr", "r")])
     for known, hidden in ((1.0, 0.4), (1.5, 0.8)):  # a known slope moves the line's start
