@@ -19,7 +19,7 @@ from aqualog.diagnose.channels import block_step, contrasts
 from aqualog.diagnose.competition import Block
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.evidence import Evidence, forgiving
-from aqualog.diagnose.hypotheses import residual
+from aqualog.diagnose.hypotheses import Hypothesis, residual
 from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.shapes import ALONG, Shape, shapes
 from aqualog.diagnose.spectrum import Weighing, weighing
@@ -234,7 +234,7 @@ def competing(parts: Sequence[Part], drives: Sequence[Drive]) -> tuple[str, ...]
 
 def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, ...], FloatArray]:
     """What competes, and the prior size of every column."""
-    places = Counter(h.effect.name for h in evidence.asked)
+    shares = _place_shares(evidence.asked)
     each = Counter(s.mechanism.name for s in made)
     sd = [evidence.prior]
     out = []
@@ -250,7 +250,7 @@ def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, .
         moments = MOMENTS if is_sought else 1
         out.append(
             Block(
-                h.key, "effect", columns, np.eye(len(c)), math.log(KNOWN_PRIOR / places[h.effect.name] / moments), i,
+                h.key, "effect", columns, np.eye(len(c)), math.log(KNOWN_PRIOR * shares[i] / moments), i,
                 low / evidence.prior[c], evidence.high[c] / evidence.prior[c],
             )
         )  # fmt: skip
@@ -264,6 +264,15 @@ def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, .
         sd.append(np.full(k, s.mechanism.usual))
         n += k
     return tuple(out), np.concatenate(sd)
+
+
+def _place_shares(asked: Sequence[Hypothesis]) -> list[float]:
+    """Share of an effect's prior that each of its places has, variants and drives that alone have it: the whole car in
+    all drives half of it, because tyres are changed and worn together."""
+    whole = [h.where is None and not h.drive for h in asked]
+    count = Counter((h.effect.name, w) for h, w in zip(asked, whole, strict=True))
+    both = {n: 0.5 if count[n, True] and count[n, False] else 1.0 for n, _ in count}
+    return [both[h.effect.name] / count[h.effect.name, w] for h, w in zip(asked, whole, strict=True)]
 
 
 def _tolerance(evidence: Evidence, made: Sequence[Shape], blocks: Sequence[Block], sd: FloatArray) -> FloatArray:
