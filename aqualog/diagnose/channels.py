@@ -30,7 +30,7 @@ class Kind(NamedTuple):
     unit: str
 
 
-# accelerometer against torque and resistance, and against the acceleration of the wheels or the velocity; rim speeds on
+# acceleration against torque and resistance, of the accelerometer if there is one; that against the acceleration of the wheels or the velocity; rim speeds on
 # the centre line against the velocity or each other; a_y against v_x times yaw rate; rods against the wheel's forces
 CHANNELS: dict[str, Kind] = {
     "force_balance": Kind("Force balance", "m/s^2"),
@@ -48,16 +48,16 @@ CHANNELS: dict[str, Kind] = {
 def channels_of(present: frozenset[str], vehicle: Vehicle) -> tuple[str, ...]:
     """Channels that a log with these signals has."""
     wheels = all(f"omega_{w}" in present for w in WHEELS)
+    moves = wheels or "v_x" in present
     out = []
-    if "a_x" in present:
-        if all(f"torque_{w}" in present for w in vehicle.driven):
-            out.append("force_balance")
-        if wheels or "v_x" in present:
-            out.append("kinematic")
+    if ("a_x" in present or moves) and all(f"torque_{w}" in present for w in vehicle.driven):
+        out.append("force_balance")
+    if "a_x" in present and moves:
+        out.append("kinematic")
     if wheels:
         out += [f"slip_{w}" for w in WHEELS] if "v_x" in present else ["axle_slip", "side_slip_f", "side_slip_r"]
     # without a steering angle the gyro leads the simulation, and its noise would be on both sides
-    if {"a_y", "yaw_rate", "steer_angle"} <= present and (wheels or "v_x" in present):
+    if {"a_y", "yaw_rate", "steer_angle"} <= present and moves:
         out.append("lateral")
     out += [n for n in ("tie_rod_fl", "tie_rod_fr") if n in present and "force_balance" in out]
     return tuple(out)
@@ -90,8 +90,8 @@ def channel_values(
 
     `columns` (n,) at the step `dt` [s]: canonical signals; of a simulation also `nudge_seen`, the acceleration that
     drew its speed to the measured one. `vehicle`: radii and distances by which wheels are compared, the file's for both
-    sides. `force_balance` is the accelerometer itself: the part that the torque explains is on the simulated side. ISO
-    8855 signs [iso8855_2011].
+    sides. `force_balance` is the accelerometer itself, or else the change of the speed: the part that the torque explains
+    is on the simulated side. ISO 8855 signs [iso8855_2011].
     """
     mean = {n: block_means(x, dt) for n, x in columns.items()}
     step = block_step(dt)
@@ -102,7 +102,7 @@ def channel_values(
     out = []
     for name in channels:
         if name == "force_balance":
-            x = mean["a_x"]
+            x = mean["a_x"] if "a_x" in mean else np.gradient(_speed(wheels, v_x) - drawn, step)
         elif name == "kinematic":
             x = mean["a_x"] - np.gradient(_speed(wheels, v_x) - drawn, step)
         elif name == "lateral":

@@ -137,7 +137,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     else:
         logged = torque = inputs.needed_torque(v, vehicle, dt)
         torques = {f"torque_{w}" for w in vehicle.driven}
-        lacks = ", ".join(sorted({"a_x", *torques} - present)) if torques & present else "wheel torque"
+        lacks = ", ".join(sorted(torques - present)) if torques & present else "wheel torque"
         notes.append(f"no {lacks} in the log: the torque is the one that the model needs for the measured speed")
     speed = inputs.quiet_speed(v, dt)
     t = np.arange(n, dtype=np.float64) * dt

@@ -116,8 +116,6 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     wet = any(d.course.lanes for d in drives)
     torque = not any(d.untorqued for d in drives)
     wheels = all(f"omega_{w}" in present for w in WHEELS)
-    # torque is judged beside the acceleration that it makes
-    is_alone = "a_x" not in present and any(s.startswith("torque_") for s in present)
     has: dict[Need, bool] = {"water depth": wet, "wheel torque": torque, "wheel speeds": wheels}
     has["a_x or wheel torque"] = torque or "a_x" in present
     length, names = max(d.duration_s for d in drives), [d.name for d in drives]
@@ -130,8 +128,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         is_sought = bool(effect.drive.begins_like) and (len(drives) == 1 or bool(apart))  # see `moments`
         missing = next((need for need in effect.drive.needs if not has[need]), None)
         if missing is not None:
-            lacks = "a_x beside the wheel torque" if is_alone and "torque" in missing else missing
-            untested[effect.name] = f"no {lacks} in the log"
+            untested[effect.name] = f"no {missing} in the log"
             continue
         free = tuple(p.name for p in effect.parameters[: effect.drive.count])
         wheels_of = WHEELS if effect.drive.by_wheel else ()

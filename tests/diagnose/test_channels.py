@@ -91,11 +91,22 @@ def test_without_a_reference_wheels_are_compared_with_wheels():
 
 
 @pytest.mark.parametrize(("without", "lost"), [
-    ({"a_x"}, {"force_balance", "kinematic"}), ({"torque_rl"}, {"force_balance"}), ({"steer_angle"}, {"lateral"}),
+    ({"a_x"}, {"kinematic"}), ({"a_x", "v_x", "omega_fl"}, {"force_balance", "kinematic", "lateral", *(f"slip_{w}" for w in WHEELS)}),
+    ({"torque_rl"}, {"force_balance"}), ({"steer_angle"}, {"lateral"}),
     ({"omega_fl"}, {f"slip_{w}" for w in WHEELS}),
 ])  # fmt: skip
 def test_a_channel_needs_its_signals(without, lost):
     assert set(channels_of(ALL, CAR)) - set(channels_of(ALL - without, CAR)) == lost
+
+
+def test_without_an_accelerometer_the_torque_is_judged_by_the_change_of_speed():
+    t = np.arange(0.0, 10.0, 0.01)
+    wheels = {f"omega_{w}": (20.0 + 0.5 * t) / CAR.r_e(w) for w in WHEELS}
+    (x,) = channel_values(wheels, ("force_balance",), CAR, dt=0.01)
+    np.testing.assert_allclose(x, 0.5, atol=1e-9)
+    # what drew a simulated speed to the measured one is no force of the car
+    (x,) = channel_values(wheels | {"nudge_seen": np.full(t.size, 0.2)}, ("force_balance",), CAR, dt=0.01)
+    np.testing.assert_allclose(x, 0.3, atol=1e-9)
 
 
 def test_tie_rods_need_the_torque():

@@ -312,6 +312,14 @@ def test_a_force_with_a_name_is_no_slope_of_the_road(monkeypatch):
     assert mean.low < road.grid[:, 1].mean() < mean.high
 
 
+def test_the_torque_is_judged_without_an_accelerometer(monkeypatch):
+    ask(monkeypatch, ("payload_mass", "aero_drag", "tyre_radius@fl"))
+    assert told(log=noisy(drop=["a_x"])).verdict == "no_effect"
+    d = told(log=noisy(term("payload_mass", delta_mass=250.0), drop=["a_x"]))
+    assert (d.verdict, keys(d)) == ("named", {"payload_mass"})
+    assert d.causes[0].parameters["delta_mass"].value == pytest.approx(250.0, abs=40.0)
+
+
 def test_the_road_of_one_of_two_drives(monkeypatch):
     ask(monkeypatch, ("payload_mass", "road_grade"))
     flat = Spec("mixed", "gusts", (), 8, "compact_fwd", holdout=0)
