@@ -72,7 +72,8 @@ def passes(data: CampaignData) -> list[Pass]:
         if np.count_nonzero(wet) * samples.step_s < LEAST_S:
             continue
         v, t = samples.array("v_x")[wet], samples.t[wet]
-        start, end = float(t[0]), float(t[-1])
+        # the first wet step begins within the one before it, and fast wheels slow down at once
+        start, end = float(t[0]) - samples.step_s, float(t[-1])
         wheels = free_of(info)
         seconds = float(np.count_nonzero(wet)) * samples.step_s
         slips = {w: samples.array(f"slip_min_{w}")[wet] for w in wheels}
