@@ -23,10 +23,10 @@ FULL_SLIP = -0.5  # [-] a wheel that has lost half of its speed floats; smaller 
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """One run over the watered lane: mean speed [m/s], time and distance on it from entry to exit, and per free wheel: `minor` spin-downs
-    begun there, `full` spin-downs (found by their detector, and half of the speed lost), `deepest` slip, rim against
-    car. `foretold`: logarithm of the speed of full aquaplaning [ln(m/s)] that the margin expects, and its standard
-    deviation, means over the lane from `SETTLED_S` on; NaN without one.
+    """One run over the watered lane: mean speed [m/s], time and distance from entry to exit, and per free wheel:
+    `minor` spin-downs begun there, `full` spin-downs (found by their detector, and half of the speed lost), `deepest`
+    slip, rim against car. `foretold`: logarithm of the speed of full aquaplaning [ln(m/s)] that the margin expects, and
+    its standard deviation, means over the lane from `SETTLED_S` on; NaN without one.
     """
 
     info: RunInfo
@@ -72,7 +72,7 @@ def passes(data: CampaignData) -> list[Pass]:
         if np.count_nonzero(wet) * samples.step_s < LEAST_S:
             continue
         v, t = samples.array("v_x")[wet], samples.t[wet]
-        # fast wheels slow down at once on entry, before they have settled
+        # with what has not settled yet: fast wheels slow down at once
         start, end = float(t[0]) - SETTLING_S - samples.step_s, float(t[-1]) + SETTLING_S
         wheels = free_of(info)
         seconds = float(np.count_nonzero(wet)) * samples.step_s + 2.0 * SETTLING_S

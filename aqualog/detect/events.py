@@ -16,10 +16,10 @@ Evidence = Mapping[str, tuple[str, FloatArray | BoolArray]]
 """Name -> (how, values): `first`, `last`, `min`, `max`; of a bit, `any` or `at_start`; of ones and
 zeros, their `share` of ones."""
 
-SINCE, AFTER = "since_s", "after_s"
-"""Evidence of when the cause began and ended: seconds from there to the first (`first`) and last sample (`last`)."""
+SINCE, AFTER, DURATION = "since_s", "after_s", "duration_s"
+"""Evidence of when the cause began and ended: seconds from there to the first (`first`) and last sample (`last`);
+and how long the event is, for its severity."""
 
-DURATION = "duration_s"  # of the event, which its severity is told besides the evidence
 REACH_S = 10.0  # [s] no cause began so long before its detection
 
 Severity = Callable[[Mapping[str, Any]], str]

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from functools import partial
-from typing import Any
 
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.detector import Detector, Needs, missing_drivetrain, missing_torques, missing_wheels, too_slow
 from aqualog.detect.events import DURATION
 from aqualog.detect.resistance import RESISTANCE
-from aqualog.detect.spin import MIN_RATE, THRESHOLD, SpinWatch
+from aqualog.detect.spin import LOST_S, MIN_RATE, THRESHOLD, SpinWatch
 
 __all__ = ["SPIN_UP"]
-
-LOST_S = 0.06  # [s] twice the memory of wheel accelerations: what is shorter is a change of torque or a gap of water
 
 
 def _needs_up(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
@@ -26,16 +23,6 @@ def _needs_up(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
     )
 
 
-def severity(evidence: Mapping[str, Any]) -> str:
-    """Full and partial by the traction coefficient (thesis 2.5, criterion 3); partial where it is unknown.
-
-    It is lost for most of the event, since its least value is that of a moment in which the torque changes, and for
-    longer than such a moment.
-    """
-    lost = evidence.get("mu_lost", 0.0)
-    return "full" if lost > 0.5 and lost * evidence[DURATION] > LOST_S - 1e-9 else "partial"
-
-
 SPIN_UP = Detector(
     name="spin_up",
     title="Spin-up",
@@ -45,7 +32,8 @@ SPIN_UP = Detector(
     threshold=THRESHOLD,
     needs=_needs_up,
     start=partial(SpinWatch, sign=1.0),
-    # wet ice holds less than the limit too, but costs nothing (C27)
-    reads=(RESISTANCE,),
-    severity=severity,
+    reads=(RESISTANCE,),  # wet ice holds less than the limit too, but costs nothing (C27)
+    # thesis 2.5, criterion 3: by the traction coefficient over most of the event, for longer than the torque changes or
+    # the contact has a gap; partial where it is unknown
+    severity=lambda e: "full" if (lost := e.get("mu_lost", 0.0)) > 0.5 and lost * e[DURATION] >= LOST_S else "partial",
 )
