@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.campaign.bins import KMH, Group, Plan, free_of, group_of, sort_key
-from aqualog.campaign.results import CampaignData, RunInfo
+from aqualog.campaign.results import SETTLING_S, CampaignData, RunInfo
 from aqualog.core.intervals import Interval, poisson, wilson
 from aqualog.core.records import FloatArray
 
@@ -23,10 +23,10 @@ FULL_SLIP = -0.5  # [-] a wheel that has lost half of its speed floats; smaller 
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """One run over the watered lane: mean speed [m/s], time and distance on it, and per free wheel: `minor` spin-downs
-    begun there, `full` spin-downs (found by their detector, and half of the speed lost), `deepest` slip, rim against
-    car. `foretold`: logarithm of the speed of full aquaplaning [ln(m/s)] that the margin expects, and its standard
-    deviation, means over the lane from `SETTLED_S` on; NaN without one.
+    """One run over the watered lane: mean speed [m/s], time and distance from entry to exit, and per free wheel:
+    `minor` spin-downs begun there, `full` spin-downs (found by their detector, and half of the speed lost), `deepest`
+    slip, rim against car. `foretold`: logarithm of the speed of full aquaplaning [ln(m/s)] that the margin expects, and
+    its standard deviation, means over the lane from `SETTLED_S` on; NaN without one.
     """
 
     info: RunInfo
@@ -72,9 +72,10 @@ def passes(data: CampaignData) -> list[Pass]:
         if np.count_nonzero(wet) * samples.step_s < LEAST_S:
             continue
         v, t = samples.array("v_x")[wet], samples.t[wet]
-        start, end = float(t[0]), float(t[-1])
+        # with what has not settled yet: fast wheels slow down at once
+        start, end = float(t[0]) - SETTLING_S - samples.step_s, float(t[-1]) + SETTLING_S
         wheels = free_of(info)
-        seconds = float(np.count_nonzero(wet)) * samples.step_s
+        seconds = float(np.count_nonzero(wet)) * samples.step_s + 2.0 * SETTLING_S
         slips = {w: samples.array(f"slip_min_{w}")[wet] for w in wheels}
         deepest = {w: float(np.nanmin(x)) if np.isfinite(x).any() else math.nan for w, x in slips.items()}
         minor, full = (

@@ -10,14 +10,15 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, Event, FloatArray, Track
 
-__all__ = ["AFTER", "SINCE", "EventBook", "Evidence", "Explain", "Severity", "as_they_are"]
+__all__ = ["AFTER", "DURATION", "SINCE", "EventBook", "Evidence", "Explain", "Severity", "as_they_are"]
 
 Evidence = Mapping[str, tuple[str, FloatArray | BoolArray]]
 """Name -> (how, values): `first`, `last`, `min`, `max`; of a bit, `any` or `at_start`; of ones and
 zeros, their `share` of ones."""
 
-SINCE, AFTER = "since_s", "after_s"
-"""Evidence of when the cause began and ended: seconds from there to the first (`first`) and last sample (`last`)."""
+SINCE, AFTER, DURATION = "since_s", "after_s", "duration_s"
+"""Evidence of when the cause began and ended: seconds from there to the first (`first`) and last sample (`last`);
+and how long the event is, for its severity."""
 
 REACH_S = 10.0  # [s] no cause began so long before its detection
 
@@ -132,7 +133,8 @@ class _Builder:
         cause_start = self._gap_s(max(start_s - since, 0.0))[1]  # a cause is known only where there are data
         return [
             Event(
-                **self._place, start_s=start_s, end_s=end_s, severity=self._severity(opened.evidence),
+                **self._place, start_s=start_s, end_s=end_s,
+                severity=self._severity({**opened.evidence, DURATION: end_s - start_s}),
                 peak=opened.peak, threshold=self._threshold, evidence=self._explain(opened.evidence),
                 cause_s=(min(cause_start, cause_end), cause_end),
             )

@@ -45,7 +45,7 @@ class MinorParams(NamedTuple):
     def make(dt: float, threshold: float = THRESHOLD) -> MinorParams:
         """Return defaults: 0.5 s of memory, 1.2 (m/s²)² of the wheel, 1.0 of the difference, 8 to 1 below zero."""
         return MinorParams(
-            from_seconds(0.5, 0.5, dt), 1.2 * threshold, threshold, 0.7, 0.5, 8.0, 0.05, 8.0, 0.5, 0.6, dt
+            from_seconds(0.5, 0.5, dt), 1.2 * threshold, threshold, 0.7, 0.5, 8.0, 0.035, 8.0, 0.5, 0.6, dt
         )
 
 

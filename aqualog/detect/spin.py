@@ -31,8 +31,8 @@ from aqualog.features.stream import Features
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
-    "HELD_BACK", "HELD_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SpinParams", "SpinState",
-    "SpinWatch", "has_lost_traction", "initial_state", "scan", "spins_round", "wheel_evidence",
+    "HELD_BACK", "HELD_S", "LOST_S", "MIN_RATE", "MU_FULL", "MU_SPIN_UP", "SLIP_FULL", "SPIN_DOWN", "SpinParams",
+    "SpinState", "SpinWatch", "has_lost_traction", "initial_state", "scan", "spins_round", "wheel_evidence",
 ]  # fmt: skip
 
 THRESHOLD = 0.6  # [m/s]
@@ -43,6 +43,7 @@ SIDEWAYS = 3.0  # [m/s^2] of drift: a car that spins round, whose tyres hold it 
 SLIP_FULL = -0.25  # [-] a wheel that has lost a quarter of its speed has lost the road
 HELD_BACK = "held_back"  # where something holds the car back, as later detectors find it
 MU_FULL = 0.02  # [-] what a spinning driven wheel still transmits at full aquaplaning
+LOST_S = 0.06 - 1e-9  # [s] for so long, twice the memory of wheel accelerations (C67)
 
 
 class SpinParams(NamedTuple):

@@ -7,8 +7,9 @@ from functools import partial
 
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.detector import Detector, Needs, missing_drivetrain, missing_torques, missing_wheels, too_slow
+from aqualog.detect.events import DURATION
 from aqualog.detect.resistance import RESISTANCE
-from aqualog.detect.spin import MIN_RATE, THRESHOLD, SpinWatch
+from aqualog.detect.spin import LOST_S, MIN_RATE, THRESHOLD, SpinWatch
 
 __all__ = ["SPIN_UP"]
 
@@ -31,9 +32,8 @@ SPIN_UP = Detector(
     threshold=THRESHOLD,
     needs=_needs_up,
     start=partial(SpinWatch, sign=1.0),
-    # wet ice holds less than the limit too, but costs nothing (C27)
-    reads=(RESISTANCE,),
-    # thesis 2.5, criterion 3: full and partial by the traction coefficient over the whole event, since its least value
-    # is that of a moment in which the torque changes; partial where it is unknown
-    severity=lambda evidence: "full" if evidence.get("mu_lost", 0.0) > 0.5 else "partial",
+    reads=(RESISTANCE,),  # wet ice holds less than the limit too, but costs nothing (C27)
+    # thesis 2.5, criterion 3: by the traction coefficient over most of the event, for longer than the torque changes or
+    # the contact has a gap; partial where it is unknown
+    severity=lambda e: "full" if (lost := e.get("mu_lost", 0.0)) > 0.5 and lost * e[DURATION] >= LOST_S else "partial",
 )

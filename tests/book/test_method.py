@@ -78,7 +78,7 @@ def rows():
     yield "spin_up", f"| traction limit | {spin.MU_SPIN_UP:g} | an event may begin only below it"
     yield "spin_up", f"(thesis 2.1), for {spin.HELD_S:g} s |"
     yield "spin_up", f"| drift | {spin.SIDEWAYS:g} m/s² |"
-    yield "spin_up", f"traction below {spin.MU_FULL:g} for most of the event |"
+    yield "spin_up", f"traction below {spin.MU_FULL:g} for most of the event, and for {spin.LOST_S:g} s |"
     yield "minor_spin_down", f"| threshold `minor_spin_down` | {DEFAULT.minor_spin_down:.1f} (m/s²)² |"
     yield "minor_spin_down", f"| variance of the wheel itself | {m.var_min / m.delta_min:g} times"
     yield "minor_spin_down", f"| own share | {m.share:g} |"

@@ -252,7 +252,7 @@ def test_contact_fit_and_half_are_exact_without_noise():
 
 def spins(detector, wheel, from_kmh):
     def events(index, kmh):
-        return [{"detector": detector, "wheel": wheel, "start_s": 5.0, "end_s": 6.0}] if kmh >= from_kmh else []
+        return [{"detector": detector, "wheel": wheel, "start_s": 4.03, "end_s": 6.0}] if kmh >= from_kmh else []
 
     return events
 

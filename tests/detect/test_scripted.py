@@ -64,10 +64,10 @@ def test_trains_of_short_dips(length, depth):
     assert all(e.end_s < 24.5 for e in minor)
 
 
-def test_a_single_short_dip():
-    minor = [e for e in found(scripted(dips=[("fl", 20.0, 0.06, 0.1)])) if e.detector == "minor_spin_down"]
-    assert [e.wheel for e in minor] == ["fl"]
-    assert minor[0].end_s < 21.5
+@pytest.mark.parametrize(("depth", "length"), [(0.06, 0.1), (0.02, 0.05)])
+def test_a_single_short_dip(depth, length):
+    minor = [e for e in found(scripted(dips=[("fl", 20.0, depth, length)])) if e.detector == "minor_spin_down"]
+    assert [(e.wheel, e.end_s < 21.5) for e in minor] == [("fl", True)]
 
 
 @pytest.mark.parametrize("seed", range(10))

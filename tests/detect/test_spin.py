@@ -107,15 +107,15 @@ def test_a_spin_down_does_not_wait():
     bits = spin(-1.0, np.ones(N, dtype=bool))
     assert bits.any()
     first = np.flatnonzero(bits)[0]
-    alone = np.zeros(N, dtype=bool)
-    alone[first] = True
+    alone = np.arange(N) == first
     assert spin(-1.0, alone)[first]
 
 
 def test_a_spin_up_is_full_where_the_traction_is_lost_for_most_of_it():
-    assert SPIN_UP.severity({"mu_lost": 0.6, "mu_min": -0.1}) == "full"
-    assert SPIN_UP.severity({"mu_lost": 0.4, "mu_min": -0.9}) == "partial"  # one moment of changing torque
-    assert SPIN_UP.severity({}) == "partial"
+    assert SPIN_UP.severity({"mu_lost": 0.6, "mu_min": -0.1, "duration_s": 0.1}) == "full"
+    assert SPIN_UP.severity({"mu_lost": 1.0, "duration_s": 0.04}) == "partial"  # a gap of the contact (C67)
+    assert SPIN_UP.severity({"mu_lost": 0.4, "duration_s": 9.0}) == "partial"  # one moment of changing torque
+    assert SPIN_UP.severity({"duration_s": 1.0}) == "partial"
     assert SPIN_DOWN.severity({"slip_min": -0.3}) == "full"
 
 
