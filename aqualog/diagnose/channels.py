@@ -30,8 +30,9 @@ class Kind(NamedTuple):
     unit: str
 
 
-# acceleration against torque and resistance, of the accelerometer if there is one; that against the acceleration of the wheels or the velocity; rim speeds on
-# the centre line against the velocity or each other; a_y against v_x times yaw rate; rods against the wheel's forces
+# acceleration against torque and resistance, of the accelerometer if there is one; accelerometer against the
+# acceleration of the wheels or the velocity; rim speeds on the centre line against the velocity or each other; a_y
+# against v_x times yaw rate; rods against the wheel's forces
 CHANNELS: dict[str, Kind] = {
     "force_balance": Kind("Force balance", "m/s^2"),
     "kinematic": Kind("Kinematic", "m/s^2"),
@@ -90,8 +91,8 @@ def channel_values(
 
     `columns` (n,) at the step `dt` [s]: canonical signals; of a simulation also `nudge_seen`, the acceleration that
     drew its speed to the measured one. `vehicle`: radii and distances by which wheels are compared, the file's for both
-    sides. `force_balance` is the accelerometer itself, or else the change of the speed: the part that the torque explains
-    is on the simulated side. ISO 8855 signs [iso8855_2011].
+    sides. `force_balance` is the accelerometer itself, or else the change of the speed: what the torque explains is on
+    the simulated side. ISO 8855 signs [iso8855_2011].
     """
     mean = {n: block_means(x, dt) for n, x in columns.items()}
     step = block_step(dt)

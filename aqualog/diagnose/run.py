@@ -210,7 +210,8 @@ def _gained(
         return Model(tuple(t for t in m.of("").terms if id(t) in own or t.effect.name != "unexplained_grade"))
 
     unseen = _prepared(holdout, vehicle)[0] if holdout else []
-    unseen = [d for d in unseen if d.channels == ready[0].channels]
+    is_elsewhere = elsewhere(extended).terms != elsewhere(models[0]).terms  # else no other drive shows it
+    unseen = [d for d in unseen if d.channels == ready[0].channels and is_elsewhere]
     effects: tuple[Consequence, ...] = ()
     if options.consequences and "mass" in vehicle.given:
         effects = consequences(vehicle, elsewhere(extended), seed=options.seed)

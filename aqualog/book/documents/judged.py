@@ -37,6 +37,7 @@ _CAUSE = (
     several("explains", "channels that it explains"),
     text("sentence", "the cause in words"),
     number("probability", "-", "probability that the effect is there; null of a campaign", null=True),
+    several("drives", "of several drives, those that alone have it; empty: all"),
 )
 _RATES = (
     text("detector", "detector"),

@@ -12,6 +12,7 @@ from aqualog.report.diagnosis.views import view_data
 from aqualog.report.diagnosis.words import (
     by_change,
     by_sharpness,
+    cause_title,
     chance,
     channel_title,
     effect_title,
@@ -175,10 +176,10 @@ def _cause_rows(causes: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
     for c in causes:
         explains = ", ".join(channel_title(x) for x in c["explains"])
         for i, (name, p) in enumerate(c["parameters"].items()):
-            own = (effect_title(c["key"]), chance(c.get("probability")), explains) if i == 0 else ("", "", "")
+            own = (cause_title(c), chance(c.get("probability")), explains) if i == 0 else ("", "", "")
             rows.append((*own[:2], name.replace("_", " "), *interval_text(p), pretty_unit(p["unit"]), own[2]))
         if not c["parameters"]:
-            rows.append((effect_title(c["key"]), chance(c.get("probability")), "", "", "", "", explains))
+            rows.append((cause_title(c), chance(c.get("probability")), "", "", "", "", explains))
     return rows
 
 

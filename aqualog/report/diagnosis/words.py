@@ -12,7 +12,7 @@ from aqualog.report.values import interval_text, percent, pretty_unit, short, up
 from aqualog.report.wording import detector_name
 
 __all__ = [
-    "by_change", "by_sharpness", "chance", "channel_title", "coordinate_title", "effect_title",
+    "by_change", "by_sharpness", "cause_title", "chance", "channel_title", "coordinate_title", "effect_title",
     "mechanism_title", "sentences", "untested_by_reason", "verdict_title",
 ]  # fmt: skip
 
@@ -63,6 +63,11 @@ def effect_title(key: str) -> str:
     if effect in _OF_BUSES:
         place = _BUSES.get(where, place)
     return effect.replace("_", " ") + (f", {place}" if place else "")
+
+
+def cause_title(cause: Mapping[str, Any]) -> str:
+    """`payload mass in d2.mf4`: the effect, and of several drives those that alone have it."""
+    return effect_title(cause["key"]) + (f" in {', '.join(cause['drives'])}" if cause.get("drives") else "")
 
 
 def coordinate_title(name: str) -> str:
@@ -145,7 +150,7 @@ def _test(s: Mapping[str, Any] | None) -> list[str]:
 
 
 def _alternative(a: Mapping[str, Any]) -> str:
-    names = " with ".join(effect_title(c["key"]) for c in a["causes"])
+    names = " with ".join(map(cause_title, a["causes"]))
     values = "; ".join(
         f"{name.replace('_', ' ')} {value} ({interval}) {pretty_unit(p['unit'])}".rstrip(" –")
         for c in a["causes"]
@@ -322,7 +327,7 @@ def _headline(document: Mapping[str, Any]) -> str:
     """The verdict's sentence with the probability of each cause, and of the first unknown form."""
     said: str = document["sentence"] or f"{verdict_title(document['verdict'])}."
     forms = document["unexplained"][:1] if document["verdict"] == "unexplained" else []
-    known = {effect_title(c["key"]): chance(c.get("probability")) for c in document["causes"]}
+    known = {cause_title(c): chance(c.get("probability")) for c in document["causes"]}
     if forms:
         known = {"the unknown form": chance(forms[0].get("probability"))} | known
     known = {name: p for name, p in known.items() if p}
