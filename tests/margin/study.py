@@ -48,11 +48,13 @@ def foretold(make, seed, runs=8):
 
 
 def lines(x, title):
-    """A row for each cell of the true distance."""
+    """A row for each cell of the true distance that has passes with a distance."""
     yield f"{title}: n {len(x)}, warned before the water {int(x[:, 7].sum())}"
     for low, high in CELLS:
         cell = x[(x[:, 0] >= low) & (x[:, 0] < high)]
         has = cell[np.isfinite(cell[:, 1])]
+        if not len(has):
+            continue
         true, away = has[:, 0], has[:, 1] - has[:, 0]
         in90, in50 = (np.mean((has[:, a] <= true) & (true <= has[:, a + 1])) for a in (2, 4))
         yield (
@@ -79,6 +81,8 @@ def main():
         return
     x = np.array([outcome(make(seed, DRIVETRAINS[seed % 3])) for seed in seeds], dtype=float)
     print("\n".join(lines(x, "foreign" if a.foreign else "own")))
+    for i, drivetrain in enumerate(DRIVETRAINS):
+        print("\n".join(lines(x[np.array(seeds) % 3 == i], drivetrain)))
 
 
 if __name__ == "__main__":
