@@ -48,17 +48,15 @@ def foretold(make, seed, runs=8):
 
 
 def lines(x, title):
-    """A row for each cell of the true distance that has passes with a distance."""
+    """A row for each cell of the true distance."""
     yield f"{title}: n {len(x)}, warned before the water {int(x[:, 7].sum())}"
     for low, high in CELLS:
         cell = x[(x[:, 0] >= low) & (x[:, 0] < high)]
         has = cell[np.isfinite(cell[:, 1])]
-        if not len(has):
-            continue
         true, away = has[:, 0], has[:, 1] - has[:, 0]
         in90, in50 = (np.mean((has[:, a] <= true) & (true <= has[:, a + 1])) for a in (2, 4))
         yield (
-            f"  {low:3d} to {high:2d} km/h: n {len(cell):4d}, distance given {len(has) / len(cell):.2f}; median error "
+            f"  {low:3d} to {high:2d} km/h: n {len(cell):4d}, distance given {len(has) / max(len(cell), 1):.2f}; median error "
             f"{np.median(np.abs(away)):4.1f}, bias {np.median(away):+5.1f}, 90 % holds {in90:.2f}, 50 % holds {in50:.2f}, "
             f"half width {0.5 * np.median(has[:, 3] - has[:, 2]):4.1f}; warned {cell[:, 6].mean():.2f}"
         )
