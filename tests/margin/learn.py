@@ -240,7 +240,8 @@ def main():
         roads = () if a.same_roads else (*of_drives(a.first, a.drives), *of_others(a.first, a.others))
         np.savez(a.keep, x=np.array((*of_passes(a.first, a.passes), *roads)))
     tables, n = learn(np.load(a.keep)["x"], a.same_roads)
-    note = f"Made by `python -m tests.margin.learn` from {n:,} windows{', with the kinds of road before' * a.same_roads}."
+    roads = ", kinds of road from before" * a.same_roads
+    note = f"Made by `python -m tests.margin.learn` from {n:,} windows{roads}."
     target = Path(emissions.__file__).with_name("emissions.toml")
     target.write_text("\n".join(text_of(tables, note)) + "\n", encoding="utf-8")
 
