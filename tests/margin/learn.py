@@ -207,24 +207,25 @@ def of_law(rows):
     return *laws_of(x[:, :_N], x[:, _N:], ratio), contact
 
 
-def learn(found):
-    """Emissions by drivetrain from rows of windows."""
+def learn(found, same_roads=False):
+    """Emissions by drivetrain from rows of windows; with `same_roads` the kinds of road of the file at hand."""
     found = found[np.isfinite(found[:, 5:]).all(axis=1)]
     before, tables = prior(np.random.default_rng(5)), {}
     for d, drivetrain in enumerate(DRIVETRAINS):
         own = found[found[:, 0] == d]
         road, law, ratio, x = own[:, 1], own[:, 2], own[:, 3], own[:, 5:]
+        by_law = [of_law(own[(road == 1) & (law == k)]) for k in range(len(LAWS))]
+        distances = (*(np.array(each) for each in zip(*by_law, strict=True)), np.array(SHARES), before)
+        if same_roads:
+            tables[drivetrain] = Emissions(*distances, *emissions.emissions_of(drivetrain)[len(distances) :])
+            continue
         rng = np.random.default_rng(1)
         wet = (road > 0) & (road < OTHER) & (ratio < WET)
         # what slips on snow slips in proportion to the traction; means of water that did so warned on a measured road
         roads = ((road == 0, 1), (wet, 1), (road == OTHER, _Z))
         kinds = [kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]
         m, S, share = (np.concatenate(k) for k in zip(*kinds, strict=True))
-        by_law = [of_law(own[(road == 1) & (law == k)]) for k in range(len(LAWS))]
-        tables[drivetrain] = Emissions(
-            *(np.array(each) for each in zip(*by_law, strict=True)), np.array(SHARES), before, m, S, share,
-            np.repeat([0.0, 1.0, 2.0], KINDS),
-        )  # fmt: skip
+        tables[drivetrain] = Emissions(*distances, m, S, share, np.repeat([0.0, 1.0, 2.0], KINDS))
     return tables, len(found)
 
 
@@ -236,14 +237,10 @@ def main():
     parser.add_argument("--same-roads", action="store_true", help="learn distances, and keep the file's kinds of road")
     a = parser.parse_args()
     if not a.keep.exists():
-        found = (*of_passes(a.first, a.passes), *of_drives(a.first, a.drives), *of_others(a.first, a.others))
-        np.savez(a.keep, x=np.array(found))
-    tables, n = learn(np.load(a.keep)["x"])
-    if a.same_roads:
-        of_roads = ("kind_mean", "kind_scatter", "kind_prior", "road")
-        file = {d: emissions.emissions_of(d) for d in tables}
-        tables = {d: t._replace(**{n: getattr(file[d], n) for n in of_roads}) for d, t in tables.items()}
-    roads = ", kinds of road from an earlier file" if a.same_roads else ""
+        roads = () if a.same_roads else (*of_drives(a.first, a.drives), *of_others(a.first, a.others))
+        np.savez(a.keep, x=np.array((*of_passes(a.first, a.passes), *roads)))
+    tables, n = learn(np.load(a.keep)["x"], a.same_roads)
+    roads = ", kinds of road from before" * a.same_roads
     note = f"Made by `python -m tests.margin.learn` from {n:,} windows{roads}."
     target = Path(emissions.__file__).with_name("emissions.toml")
     target.write_text("\n".join(text_of(tables, note)) + "\n", encoding="utf-8")

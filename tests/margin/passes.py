@@ -86,7 +86,7 @@ def any_tyre(tyre: Tyre, rng: np.random.Generator, exponents: tuple[float, float
         tyre, v_anchor=v_anchor, pressure_exponent=pressure_exponent, thin_gain=thin_gain, tread_gain=tread_gain,
         contact_exponent=n, wedge_arm=tyre.wedge_arm * 1.5 * rng.uniform() ** 2,
         h_film=even(0.15e-3, 1.0e-3), groove_relief=rng.uniform(0.2, 0.9), h_wave=even(0.8e-3, 4e-3),
-        h_track=even(0.2e-3, 0.8e-3), width=tyre.width * rng.uniform(0.2, 1.4), wet_friction=rng.uniform(0.65, 0.95),
+        h_track=even(0.2e-3, 2.0e-3), width=tyre.width * even(0.1, 1.4), wet_friction=rng.uniform(0.65, 0.95),
         load_sensitivity=rng.uniform(0.0, 0.3), contact_scatter=even(0.001, 0.12), scatter_length=even(0.2, 2.0),
         track_irregularity=even(0.03, 0.4), slip_slope_factor=tyre.slip_slope_factor * even(0.8, 1.2),
     )  # fmt: skip

@@ -56,7 +56,7 @@ def lines(x, title):
         true, away = has[:, 0], has[:, 1] - has[:, 0]
         in90, in50 = (np.mean((has[:, a] <= true) & (true <= has[:, a + 1])) for a in (2, 4))
         yield (
-            f"  {low:3d} to {high:2d} km/h: n {len(cell):4d}, distance given {len(has) / len(cell):.2f}; median error "
+            f"  {low:3d} to {high:2d} km/h: n {len(cell):4d}, distance given {len(has) / max(len(cell), 1):.2f}; median error "
             f"{np.median(np.abs(away)):4.1f}, bias {np.median(away):+5.1f}, 90 % holds {in90:.2f}, 50 % holds {in50:.2f}, "
             f"half width {0.5 * np.median(has[:, 3] - has[:, 2]):4.1f}; warned {cell[:, 6].mean():.2f}"
         )
@@ -79,6 +79,8 @@ def main():
         return
     x = np.array([outcome(make(seed, DRIVETRAINS[seed % 3])) for seed in seeds], dtype=float)
     print("\n".join(lines(x, "foreign" if a.foreign else "own")))
+    for i, drivetrain in enumerate(DRIVETRAINS):
+        print("\n".join(lines(x[np.array(seeds) % 3 == i], drivetrain)))
 
 
 if __name__ == "__main__":

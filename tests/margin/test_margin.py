@@ -11,7 +11,7 @@ from aqualog.detect.margin import recursion
 from aqualog.detect.margin.emissions import emissions_of
 from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.recursion import scan
-from aqualog.detect.margin.state import NODES, Filter, Inputs
+from aqualog.detect.margin.state import NODES, Filter, FilterParams, Inputs
 from aqualog.detect.margin.watch import params
 from aqualog.detect.stream import detect_drive
 from aqualog.features.stream import FeatureStream
@@ -112,7 +112,8 @@ def test_a_wheel_that_has_stopped_teaches_nothing_of_the_dry_road_behind(car, km
 def test_slips_of_full_aquaplaning_count_where_nothing_shakes():
     t = emissions_of("awd").in_columns()
     near, far = (int(np.argmin(np.abs(NODES - x))) for x in (0.0, 0.55))
-    z, P, n = np.array([1.0, np.log(80 / 108), np.arcsinh(8.0)]), np.array([1.0, 0.1, 0.1, 4.0, 4.0]), t.mean.shape[2]
+    R, M = (FilterParams._field_defaults[name] ** 2 for name in ("law_R", "law_M"))
+    z, P, n = np.array([1.0, np.log(80 / 108), np.arcsinh(8.0)]), np.array([R, 0.1, 0.1, M, M]), t.mean.shape[2]
     x, score = np.array([1.7, 6.0, 6.0, 0.0, 0.0]), np.empty((2, n))
     for k, calm in enumerate((0.0, 0.3)):
         work = np.full(n, calm), np.empty((5, 5, n)), np.empty((9, n))
