@@ -110,7 +110,8 @@ def _first(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
     along = [
         i for i, b in enumerate(arena.blocks) if b.kind == "shape" and set(arena.shapes[b.tag].coordinates) & set(ALONG)
     ]
-    return [best, *((*best, m) for m in first_of(arena.blocks, inner, arena.name, best, along))]
+    apart = [i for i, b in enumerate(arena.blocks) if b.kind == "effect" and arena.evidence.asked[b.tag].drive]
+    return [best, *((*best, m) for m in first_of(arena.blocks, inner, arena.name, best, along, apart))]
 
 
 def begin(arena: Arena) -> Begun:

@@ -140,7 +140,8 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             untested[f"{effect.name}@steer_angle"] = "no residual compares the steering with the car's turning"
         for where in () if is_sought else asked:
             room = room_of(effect, where, drives[0].vehicle, wheels=wheels)
-            alone = apart if effect.belongs == "drive" and where not in (*WHEELS, *AXLES) else []
+            is_whole = where not in (*WHEELS, *AXLES) or effect.drive.is_single  # a load may sit at an axle
+            alone = apart if effect.belongs == "drive" and is_whole else []
             variants = effect.drive.variants(length)
             out += [Hypothesis(effect, where, free, fixed, room, n) for n in ("", *alone) for fixed in variants]
     out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(() if torque else (STAND_IN,)))]

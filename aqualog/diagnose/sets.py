@@ -93,20 +93,23 @@ def shares(evidence: Sequence[float]) -> FloatArray:
 
 def first_of(
     blocks: Sequence[Block], inner: FloatArray, name: Callable[[int], str], beside: Members = (),
-    along: Collection[int] = (),
+    along: Collection[int] = (), apart: Collection[int] = (),
 ) -> list[int]:  # fmt: skip
     """The few known effects, each at its best place, the few shapes and the road that gain most beside a set. `along`:
-    shapes over time and place, which have places of their own: where noise is slow they would take all others."""
+    shapes over time and place, which have places of their own: where noise is slow they would take all others. So do
+    effects that one of several drives alone has, `apart`: what all share gains more in a noise that is wrong in all."""
     gains = _gains(joined(inner, blocks, beside), blocks, packed(blocks), inner)
     order = [i for i in np.argsort(-gains, kind="stable").tolist() if i not in beside and gains[i] > 0.0]
     known: dict[str, int] = {}
+    alone: dict[str, int] = {}
     for i in order:
         if blocks[i].kind == "effect":
-            known.setdefault(name(i), i)
+            (alone if i in apart else known).setdefault(name(i), i)
     shapes = [i for i in order if blocks[i].kind == "shape"]
     late, others = ([i for i in shapes if (i in along) is over] for over in (True, False))
     roads = [i for i in order if blocks[i].kind == "road"]
-    return [*list(known.values())[:FEW_KNOWN], *late[:FEW_ALONG], *others[:FEW], *roads[:1]]
+    few = [i for each in (known, alone) for i in list(each.values())[:FEW_KNOWN]]
+    return [*few, *late[:FEW_ALONG], *others[:FEW], *roads[:1]]
 
 
 def searched(

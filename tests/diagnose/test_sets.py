@@ -45,6 +45,8 @@ def test_first_candidates_are_different_effects():
     G = inner(X @ [1.0, 0.9, 0.8, 0.7, 0.0, 0.0])
     assert first_of(BLOCKS, G, lambda i: "ab"[i // 2]) == [0, 2]
     assert first_of(BLOCKS, G, lambda i: str(i), (0,)) == [1, 2, 3]
+    # what one drive alone has is tried beside what all share
+    assert first_of(BLOCKS, G, lambda _: "a", apart={1, 2}) == [0, 1]
 
 
 def test_first_candidates_are_shapes_over_time_others_and_the_road():
