@@ -84,7 +84,7 @@ def passes(data: CampaignData) -> list[Pass]:
         )  # fmt: skip
         full = {w: n if deepest[w] <= FULL_SLIP else 0 for w, n in full.items()}
         mean = float(v.mean())
-        settled = wet & (samples.t >= start + SETTLED_S)
+        settled = wet & (samples.t >= float(t[0]) + SETTLED_S)
         foretold = _foretold(*(samples.array(f"v_full{end}")[settled] for end in ("", "_low", "_high")))
         found.append(Pass(info, mean, seconds, mean * seconds, minor, full, deepest, foretold))
     return found

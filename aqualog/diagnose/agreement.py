@@ -36,7 +36,8 @@ def agreements(found: Found, r: Refit) -> tuple[Agreement, ...]:
     # the car's drive-to-drive spread is added to the variance of a single drive's value
     sd = np.array([np.sqrt(np.diag(np.linalg.inv(g + keep)) + apart**2) for g in G])
     others = np.array([np.linalg.solve(G.sum(axis=0) - g + keep, b.sum(axis=0) - x) for g, x in zip(G, b, strict=True)])
-    gains = [0.5 * (_loss(g, x, -r.off) - _loss(g, x, o)) for g, x, o in zip(G, b, others, strict=True)]
+    bare = np.where([bool(h.drive) for h, _ in r.names], 0.0, -r.off)  # no gain of what one drive alone has
+    gains = [0.5 * (_loss(g, x, bare) - _loss(g, x, o)) for g, x, o in zip(G, b, others, strict=True)]
     out = []
     for k, (h, name) in enumerate(r.names):
         if h.drive:

@@ -234,7 +234,7 @@ def competing(parts: Sequence[Part], drives: Sequence[Drive]) -> tuple[str, ...]
 
 def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, ...], FloatArray]:
     """What competes, and the prior size of every column."""
-    shares = _place_shares(evidence.asked)
+    shares = _place_shares([h for h, barred in zip(evidence.asked, evidence.barred, strict=True) if not barred])
     each = Counter(s.mechanism.name for s in made)
     sd = [evidence.prior]
     out = []
@@ -250,7 +250,7 @@ def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, .
         moments = MOMENTS if is_sought else 1
         out.append(
             Block(
-                h.key, "effect", columns, np.eye(len(c)), math.log(KNOWN_PRIOR * shares[i] / moments), i,
+                h.key, "effect", columns, np.eye(len(c)), math.log(KNOWN_PRIOR * shares[id(h)] / moments), i,
                 low / evidence.prior[c], evidence.high[c] / evidence.prior[c],
             )
         )  # fmt: skip
@@ -266,13 +266,13 @@ def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, .
     return tuple(out), np.concatenate(sd)
 
 
-def _place_shares(asked: Sequence[Hypothesis]) -> list[float]:
-    """Share of an effect's prior that each of its places has, variants and drives that alone have it: the whole car in
-    all drives half of it, because tyres are changed and worn together."""
+def _place_shares(asked: Sequence[Hypothesis]) -> dict[int, float]:
+    """Share of an effect's prior that each hypothesis has, by its identity: places, variants, drives that alone have
+    it. What acts on the whole car has half of it in all drives, because tyres are changed and worn together."""
     whole = [h.where is None and not h.drive for h in asked]
     count = Counter((h.effect.name, w) for h, w in zip(asked, whole, strict=True))
     both = {n: 0.5 if count[n, True] and count[n, False] else 1.0 for n, _ in count}
-    return [both[h.effect.name] / count[h.effect.name, w] for h, w in zip(asked, whole, strict=True)]
+    return {id(h): both[h.effect.name] / count[h.effect.name, w] for h, w in zip(asked, whole, strict=True)}
 
 
 def _tolerance(evidence: Evidence, made: Sequence[Shape], blocks: Sequence[Block], sd: FloatArray) -> FloatArray:

@@ -72,14 +72,18 @@ def make_evidence(
     # drag counts at this speed [m/s]: a head wind's v w is nearest to drag's v^2 by least squares there
     v, car = np.concatenate([d.coordinates["v_x"][d.mask] for d in drives]), drives[0].vehicle
     speed = float((v**3).sum() / max(float((v**2).sum()), 1e-9))
+    apart = {(h.effect.name, h.where) for h in asked if h.drive and not h.effect.drive.begins_like}
     for h in asked:
         columns.append(tuple(range(len(rows), len(rows) + len(h.free))))
         # of one effect, which look much alike and together deviate by as much as one; moments do not
         shared = 1.0 / math.sqrt(max(variants[h.effect.name, h.where, h.drive], 1))
         for name in h.free:
             p, now = h.parameter(name), value_in(model, h, name)
-            spread = shared * math.hypot(day_to_day(h, name, car), deviation(h, name, car))
-            tolerance = shared * h.tolerance(name)
+            # what differs from drive to drive does so in each; what is not worth naming is half in all, half in each
+            is_apart = (h.effect.name, h.where) in apart
+            daily = 0.0 if is_apart and not h.drive else day_to_day(h, name, car)
+            spread = shared * math.hypot(daily, deviation(h, name, car))
+            tolerance = shared * h.tolerance(name) * (math.sqrt(0.5) if is_apart else 1.0)
             size, value = h.worth_naming(name), as_value(h, name, car, speed)
             rows.append((p.sigma, p.low - now, p.high - now, size, tolerance, spread, value))
             kinds.append("" if p.day_to_day is None else p.day_to_day.kind)

@@ -124,7 +124,7 @@ def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:
         return own
 
     def off(key: str) -> float:
-        return math.hypot(vehicle.spread.get(key, 0.0), own_sd(vehicle, key))
+        return math.hypot(vehicle.spread.get(key, 0.0), 0.0 if h.drive else own_sd(vehicle, key))
 
     sd = {
         "inertia": math.hypot(off("mass") / vehicle.mass, off("torque_gain") / vehicle.torque_gain),

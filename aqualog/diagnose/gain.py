@@ -101,7 +101,7 @@ def rms_of_both(
 
 def _free_speed(d: Drive, model: Model) -> FloatArray:
     # the measured speed, not the target speed, which belongs to another model
-    shown = follow(d.vehicle, replace(d.course, v_x=d.speed), model, rate=FREE_RATE)
+    shown = follow(d.vehicle, replace(d.course, v_x=d.speed), model.of(d.name), rate=FREE_RATE)
     return block_means(shown["v_x"] - d.speed, d.dt)
 
 

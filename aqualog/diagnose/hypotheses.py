@@ -119,7 +119,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     has: dict[Need, bool] = {"water depth": wet, "wheel torque": torque, "wheel speeds": wheels}
     has["a_x or wheel torque"] = torque or "a_x" in present
     length, names = max(d.duration_s for d in drives), [d.name for d in drives]
-    apart = names if 1 < len(set(names)) == len(names) <= MOST_APART else []
+    apart = names if 1 < len(names) <= MOST_APART else []
     out: list[Hypothesis] = []
     untested: dict[str, str] = {}
     for effect in EFFECTS.values():

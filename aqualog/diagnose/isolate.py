@@ -72,8 +72,9 @@ def reference_sizes(
 def limits(evidence: Evidence, sizes: FloatArray) -> tuple[Limit, ...]:
     """Detection limit of each effect and place, by its first parameter."""
     out: dict[str, Limit] = {}
+    shared = {h.key for h in evidence.asked if not h.drive}
     for h, columns in zip(evidence.asked, evidence.columns, strict=True):
-        if h.allowed or h.drive:
+        if h.allowed or (h.drive and h.key in shared):
             continue
         size = float(sizes[columns[0]])
         old = out.get(h.key)
@@ -88,10 +89,11 @@ def confusions(evidence: Evidence, gram: FloatArray, sizes: FloatArray) -> tuple
     Effects have their reference sizes; effects that the log cannot show are left out.
     """
     G = gram[:-1, :-1]
+    shared = {h.key for h in evidence.asked if not h.drive}
     seen = [
         i for i, c in enumerate(evidence.columns)
         if math.isfinite(sizes[c[0]]) and len(c) == 1
-        and not (evidence.asked[i].allowed or evidence.asked[i].drive)
+        and not (evidence.asked[i].allowed or (evidence.asked[i].drive and evidence.asked[i].key in shared))
     ]  # fmt: skip
     first: dict[str, int] = {}
     for i in seen:

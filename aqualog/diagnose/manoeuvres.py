@@ -14,7 +14,7 @@ from aqualog.diagnose.drive import Drive
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import PERFECT
 from aqualog.model.scenario import Lane, Profile, Scenario, Steering
-from aqualog.model.term import Check, Model, Term
+from aqualog.model.term import Check, Model
 
 __all__ = [
     "LENGTH_S", "RUNS", "SENSORS", "Run", "Sensor", "checks", "fitting", "programme", "turned",
@@ -134,6 +134,6 @@ def programme(run: Run, drive: Drive) -> Scenario:
 def turned(model: Model) -> Model:
     """The model as it acts when the same road is driven the other way: wind and slope come from the other side."""
     return Model(tuple(
-        Term(t.effect, {n: -v for n, v in t.values.items()}, t.where, tuple((x, -v) for x, v in t.knots))
+        replace(t, values={n: -v for n, v in t.values.items()}, knots=tuple((x, -v) for x, v in t.knots))
         if t.effect.drive.turns else t for t in model.terms
     ))  # fmt: skip

@@ -48,7 +48,7 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
         if chosen is None:
             return ()
         # a member that is too small to be worth naming is not named: its sign says nothing against the others
-        return repeats(chosen, found.arena, noises, {c.key for c in best.large})
+        return repeats(chosen, found.arena, noises, {(c.key, "".join(c.drives)) for c in best.large})
 
     def causes_of(o: Option) -> Causes:
         return _linear(found, o.members, model) if o.refit is None else _refitted(found, o.refit)

@@ -115,7 +115,7 @@ def metric(
     owner = {c: h for h, columns in zip(evidence.asked, evidence.columns, strict=True) for c in columns}
     kinds = [(kind, owner[c].drive) for c, kind in enumerate(evidence.kinds)]
     sought = [kinds[c] for c in beside if kinds[c][0]]
-    alike = [any(kind == k and (not d or not o or d == o) for k, o in sought) for kind, d in kinds]
+    alike = [any(kind == k and o in ("", d) for k, o in sought) for kind, d in kinds]
     known = np.where(alike, 0.0, evidence.spread)
     known[list(beside)] = 0.0
     shares = np.array([share if owner[c].lane is None else 1.0 for c in range(evidence.count)])

@@ -89,6 +89,8 @@ def diagnose(
     ------
     SignalError
         If no drive can be used.
+    ConfigError
+        If two drives have the same name.
     """
     options, tell = options or Options(), progress or (lambda _text, _share: None)
     given = model or Model()
@@ -115,16 +117,16 @@ def diagnose(
     quiet = evidence.residuals if chosen is None else chosen.residuals
     noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, ready, strict=True)]
     named_too = _extended(outcome, chosen, (), bare, evidence.asked)
-    for d in ready:
-        if d.name in roads:
-            outcome = _with_road(outcome, _road(d, named_too, roads[d.name].drive) or roads[d.name])
-    is_named = any(c.effect == "road_grade" and "grade_rms" in c.parameters for c in outcome.causes)
-    extended = _extended(outcome, chosen, found.forms, model if is_named else bare, evidence.asked)
+    for d in (d for d in ready if d.name in roads):
+        outcome = _with_road(outcome, _road(d, named_too, roads[d.name].drive) or roads[d.name])
+    hilly = {c.drives for c in outcome.causes if c.effect == "road_grade" and "grade_rms" in c.parameters}
+    other = [r.term for r in roads.values() if r.cause.drives not in hilly]
+    with_roads = Model(tuple(t for t in model.terms if t not in other)) if hilly else bare
+    extended = _extended(outcome, chosen, found.forms, with_roads, evidence.asked)
     names = {d.name for d in ready}
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
     outcome, forms = joined(outcome, seen), (*found.forms, *seen.forms)
-    shared = tolerant(evidence, COARSE * found.plain)
-    least = isolate.likelier_than_none(evidence, found.arena.blocks, shared)
+    least = isolate.likelier_than_none(evidence, found.arena.blocks, tolerant(evidence, COARSE * found.plain))
     sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.threshold, least)
     before = [_led(d, bare) if d.name in roads else residual(d, model) for d in ready]
     differs, is_unclear = extended.terms != bare.terms, outcome.verdict == "cannot_tell"
@@ -249,7 +251,8 @@ def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str
     """
     if gained is None or gained.log_score > KEPT * gained.promised:
         return outcome
-    stays = gained.in_sample or all(EFFECTS[c.effect].belongs in ("car", "tyre") for c in outcome.causes)
+    belong = {EFFECTS[c.effect].belongs for c in outcome.causes if not c.drives}
+    stays = gained.in_sample or (bool(belong) and belong <= {"car", "tyre"})
     if not stays or outcome.verdict not in ("named", "compound"):
         return outcome
     whose = "the diagnosed drives" if gained.in_sample else "held-out drives"
@@ -300,6 +303,8 @@ def _extended(
 
 def _prepared(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle) -> tuple[list[Drive], tuple[str, ...]]:
     """Drives that can be used and notes on the others; all have the channels of the first."""
+    if len({n for n, _ in drives}) < len(drives):
+        raise ConfigError("two drives have the same name", expected="a name of its own for each")
     out: list[Drive] = []
     notes: list[str] = []
     for name, signals in drives:

@@ -170,7 +170,8 @@ def _seen(case: Case, run: Run, sensor: Sensor | None) -> _Driven:
     drive = _driven(case, run, sensor)
     if not drive.mask.any():
         return drive, [], {}
-    models = [turned(c.refit.model) if run.opposite else c.refit.model for c in case.rivals]
+    shared = [c.refit.model.of("") for c in case.rivals]  # what one drive alone had, no other run has
+    models = [turned(m) if run.opposite else m for m in shared]
     left = [residual(drive, m) for m in models]
     own = [
         s for m, c, r in zip(models, case.rivals, left, strict=True)
@@ -189,7 +190,7 @@ def _signatures(
 
 def _driven(case: Case, run: Run, sensor: Sensor | None) -> Drive:
     """A run under the best set, with perfect sensors for the signals that the log has."""
-    truth = case.rivals[0].refit.model
+    truth = case.rivals[0].refit.model.of("")
     simulation = simulate(programme(run, case.drive), turned(truth) if run.opposite else truth, dt=STEP_S)
     signals = as_signals(simulation, truth=False)
     present = case.drive.present | set(sensor.signals if sensor else ())

@@ -25,8 +25,8 @@ CANCELS = 3.0
 _ORDINAL = ("the first", "the second", "the last")
 
 
-def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Container[str]) -> tuple[str, ...]:
-    """What speaks against naming some members of a refitted set, by their keys; empty if nothing does.
+def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Container[tuple[str, str]]) -> tuple[str, ...]:
+    """What speaks against naming some members of a refitted set, by their keys and drives; empty if nothing does.
 
     Each third of the drives that says something of a value must give it the same sign, and must be predicted better
     with the values of the other two thirds than without the set. No value may stand at its physical bound, and effects
@@ -42,7 +42,7 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
         alone, sd = own @ b[t], np.sqrt(np.diag(own))
         for k, (h, _) in enumerate(refit.names):
             if (
-                h.key in names
+                (h.key, h.drive) in names
                 and abs(off[k]) > SEEN * sd[k]
                 and alone[k] * off[k] < 0.0
                 and abs(alone[k]) > SEEN * sd[k]
@@ -58,7 +58,7 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
     each = np.array([np.where([owner is h for owner, _ in refit.names], off, 0.0) for h in refit.members])
     if float(np.einsum("hi,ij,hj->", each, whole, each)) > CANCELS * float(off @ whole @ off):
         out.append("the effects cancel each other for the most part: together they stand for something else.")
-    if any(at and h.key in names for (h, _), at in zip(refit.names, refit.bounded, strict=True)):
+    if any(at and (h.key, h.drive) in names for (h, _), at in zip(refit.names, refit.bounded, strict=True)):
         out.append("a value stands at its physical bound.")
     return tuple(out)
 

@@ -76,8 +76,8 @@ def candidates(options: Sequence[tuple[Option, float]], causes: Callable[[Option
 
 
 def whole(s: Candidate[Option]) -> int:
-    """How many causes act on the whole car."""
-    return sum(c.where is None for c, _ in s.causes)
+    """How many causes act on the whole car, in all drives."""
+    return sum(c.where is None and not c.drives for c, _ in s.causes)
 
 
 def decided(
@@ -92,10 +92,10 @@ def decided(
     it, `failing` what speaks against naming a set's causes.
     """
     groups: dict[frozenset[str], list[Candidate[Option]]] = {}
-    marginal: dict[str, float] = {}
+    marginal: dict[tuple[str, Sequence[str]], float] = {}
     for s in sets:
         groups.setdefault(s.names, []).append(s)
-        marginal.update({n: marginal.get(n, 0.0) + s.share for n in s.names})
+        marginal.update({n: marginal.get(n, 0.0) + s.share for n in {(c.effect, c.drives) for c in s.large}})
     ranked = sorted(groups.values(), key=lambda g: -sum(s.share for s in g))
     if not ranked or not ranked[0][0].names:
         return Outcome("no_effect", notes=(*_small(ranked[0][0]), *_likeliest(ranked[1:2])) if ranked else ())
@@ -131,8 +131,11 @@ def decided(
     return Outcome("cannot_tell", tuple(shown), tuple(others), best, certain, remain, notes)
 
 
-def _with_probability(causes: Sequence[Cause], marginal: Mapping[str, float]) -> tuple[Cause, ...]:
-    return tuple(replace(c, probability=tempered(marginal.get(c.effect, 0.0))) for c in causes)
+def _with_probability(
+    causes: Sequence[Cause], marginal: Mapping[tuple[str, Sequence[str]], float]
+) -> tuple[Cause, ...]:  # fmt: skip
+    """The causes with that of their effect at any place, in these drives."""
+    return tuple(replace(c, probability=tempered(marginal.get((c.effect, c.drives), 0.0))) for c in causes)
 
 
 def _likeliest(groups: Sequence[Sequence[Candidate[Option]]]) -> list[str]:

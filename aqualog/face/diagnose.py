@@ -80,11 +80,11 @@ class Diagnosis(Result):
     def tables(self) -> Mapping[str, pl.DataFrame]:
         """`causes`, `gain` by channel, `limits` of detection, `unexplained` and `alternatives`.
 
-        A row of `causes` is a parameter: effect, where, parameter, value, low and high (95 %), unit.
+        A row of `causes` is a parameter: effect, where, drives, parameter, value, low and high (95 %), unit.
         """
         d = self.document
         causes = [
-            {"effect": c["effect"], "where": c["where"], "parameter": name, **flat(p)}
+            {"effect": c["effect"], "where": c["where"], "drives": ", ".join(c["drives"]), "parameter": name, **flat(p)}
             for c in d["causes"]
             for name, p in (c["parameters"] or {"": {}}).items()
         ]
@@ -96,7 +96,8 @@ class Diagnosis(Result):
         unexplained = [{**r, "depends_on": ", ".join(r["depends_on"])} for r in d["unexplained"]]
         return {
             "causes": table(
-                causes, "effect where parameter value low high unit", text=("effect", "where", "parameter", "unit")
+                causes, "effect where drives parameter value low high unit",
+                text=("effect", "where", "drives", "parameter", "unit"),
             ),
             "gain": table(
                 [{"channel": name, **c} for name, c in channels.items()],

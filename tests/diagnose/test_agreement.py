@@ -73,6 +73,9 @@ def test_a_load_of_one_drive_is_named_with_the_drive():
     assert (d.verdict, [c.key for c in d.causes]) == ("named", ["payload_mass"])
     assert d.sentence.endswith("In drive 1 only.")
     assert d.causes[0].parameters["delta_mass"].value == pytest.approx(200.0, abs=40.0)
+    speed = next(c for c in d.gain.channels if c.channel == "speed")
+    assert speed.free_after < 1.01 * speed.free_before  # the others drive without it
+    assert {"pressure_loss@fl", "payload_mass"} <= {f"{x.effect}@{x.where}".removesuffix("@None") for x in d.limits}
     first = next(v for v in d.views if v.channel == "force_balance")
     assert first.drive == "drive 1"  # its pictures come first, with what the load explains
     assert np.nanstd(first.after) < 0.9 * np.nanstd(first.before)

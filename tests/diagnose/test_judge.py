@@ -22,7 +22,7 @@ def speaking(a, value, before, names, *, at_bound=False):
     x = np.array([value])
     refit = Refit((h,), x, x, np.eye(1), 0.0, Model(), left, (own,), (at_bound,))
     noises = [fit_noise(a.evidence.residuals[0], a.evidence.drives[0].mask, np.eye(1))]
-    return repeats(refit, a, noises, names)
+    return repeats(refit, a, noises, {(n, "") for n in names})
 
 
 @pytest.mark.parametrize(("last", "speaks"), [(1.0, False), (-1.5, True)])
@@ -52,7 +52,7 @@ def test_effects_that_cancel_are_no_names(values, speaks):
     off, h = np.array(values), a.evidence.asked[:2]
     left = a.evidence.residuals[0]
     refit = Refit(tuple(h), off, off, np.eye(2), 0.0, Model(), (left,), (alike,), (False, False))
-    found = repeats(refit, a, [fit_noise(left, a.evidence.drives[0].mask, np.eye(1))], {x.key for x in h})
+    found = repeats(refit, a, [fit_noise(left, a.evidence.drives[0].mask, np.eye(1))], {(x.key, "") for x in h})
     assert any("cancel" in why for why in found) == speaks
 
 

@@ -47,6 +47,11 @@ def test_each_drive_has_its_own_moments():
     for i, h in begun:  # what one drive has shows in it alone
         sizes = [np.abs(s[list(evidence.columns[i])]).max() for s in evidence.signatures]
         assert [x > 0.0 for x in sizes] == [h.drive == "a", h.drive == "b"]
+    load = next(h for h in of_both if h.key == "payload_mass")
+    alone = simulated([one], [load], Model(), lambda _t, _s: None).forgiven[0]
+    loads = [c for h, (c, *_) in zip(evidence.asked, evidence.columns, strict=True) if h.key == "payload_mass"]
+    # what is forgiven of one of them is what is forgiven of a single drive
+    assert np.hypot(*evidence.forgiven[loads[:2]]) == pytest.approx(alone)
     own = [b for b in arena_of(evidence, ()).blocks if b.key == "payload_mass"]
     assert len(own) == 3  # in both, in each
     assert sum(np.exp(b.log_prior) for b in arena_of(evidence, ()).blocks if "payload" in b.key) == pytest.approx(0.03)

@@ -197,7 +197,7 @@ def test_only_what_is_worth_naming_is_asked_whether_it_repeats(monkeypatch):
     asked = []
     monkeypatch.setattr(outcome, "repeats", lambda *given: asked.append(set(given[-1])) or ())
     assert told(option(payload_mass=200.0, head_wind=1e-6)).verdict == "named"
-    assert asked == [{"payload_mass"}]
+    assert asked == [{("payload_mass", "")}]
 
 
 def test_what_is_certain_is_not_called_open():

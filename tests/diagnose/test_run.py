@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from aqualog.core.errors import SignalError
+from aqualog.core.errors import ConfigError, SignalError
 from aqualog.diagnose import arena, run, search
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.records import Remainder
@@ -318,6 +318,11 @@ def test_the_torque_is_judged_without_an_accelerometer(monkeypatch):
     d = told(log=noisy(term("payload_mass", delta_mass=250.0), drop=["a_x"]))
     assert (d.verdict, keys(d)) == ("named", {"payload_mass"})
     assert d.causes[0].parameters["delta_mass"].value == pytest.approx(250.0, abs=40.0)
+
+
+def test_drives_need_names_of_their_own():
+    with pytest.raises(ConfigError, match="two drives have the same name"):
+        diagnose([("a", noisy()), ("a", noisy())], CAR)
 
 
 def test_the_road_of_one_of_two_drives(monkeypatch):

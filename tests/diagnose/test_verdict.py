@@ -1,5 +1,7 @@
 """Verdicts from sets with evidence: a name needs 0.95 and its checks, else the answer is what the posterior holds."""
 
+from dataclasses import replace
+
 import pytest
 
 from aqualog.diagnose.records import SURE, Cause, Estimate
@@ -41,6 +43,16 @@ def test_the_same_names_at_other_places_count_together():
     found = verdict([([cause("drag", "f")], 0.0), ([cause("drag", "r")], -0.5), ([cause("slope")], -15.0)])
     assert found.verdict == "named"
     assert found.notes == ("Equally possible: drag r.",)
+
+
+def test_a_cause_of_one_drive_has_the_probability_that_this_drive_has_it():
+    (a, large), b = cause("drag"), cause("slope")
+    in_d1, in_d2 = (replace(a, drives=(d,)) for d in ("d1", "d2"))
+    found = verdict([([(in_d1, large)], 0.0), ([(in_d2, large)], -0.5), ([b], -15.0)])
+    assert found.verdict == "cannot_tell"
+    assert found.causes[0].drives == ("d1",)
+    assert found.causes[0].probability == pytest.approx(0.62, abs=0.01)
+    assert found.notes == ("Equally possible: drag None.",)
 
 
 def test_a_cause_that_fails_its_check_is_not_named():

@@ -64,7 +64,7 @@ def test_files_are_those_of_the_command(folder):
 def test_tables(folder):
     result = aq.diagnose(folder / "a.parquet", folder / "car.toml")
     causes = result.tables["causes"]
-    assert causes.columns == ["effect", "where", "parameter", "value", "low", "high", "unit"]
+    assert causes.columns == ["effect", "where", "drives", "parameter", "value", "low", "high", "unit"]
     assert causes.row(0)[0] == "payload_mass"
     assert causes["low"][0] < causes["value"][0] < causes["high"][0]
     assert {"gain", "limits", "unexplained", "alternatives"} < set(result.tables)
