@@ -39,7 +39,7 @@ def test_detect(tmp_path):
     command("detect", LOG, "--vehicle", CAR, "-o", tmp_path / "command", "--write", tmp_path / "by_command.mf4")
     for name in DETECTED:
         assert (tmp_path / "face" / name).read_bytes() == (tmp_path / "command" / name).read_bytes()
-    assert result.events.height == len(result.document["events"]) == 13
+    assert result.events.height == len(result.document["events"]) == 12
     assert result.verdict == result.document["verdict"] == "aquaplaning"
     (episode,) = result.episodes.filter(pl.col("kind") == "aquaplaning").rows(named=True)
     assert (episode["start_s"], episode["wheels"]) == (pytest.approx(8.0, abs=0.1), "fr, fl")
