@@ -34,6 +34,7 @@ from aqualog.diagnose.records import SURE, Consequence, Diagnosis, Gain, Remaind
 from aqualog.diagnose.refit import Refit, likeliest, metric
 from aqualog.diagnose.run_information import Rival
 from aqualog.diagnose.search import Found, Option, Tell, search, simulated
+from aqualog.diagnose.slow_force import slow_force
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unknown_term import as_term, short_form
@@ -106,7 +107,7 @@ def diagnose(
     ready, notes = list(evidence.drives), notes + moved
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     notes += competing(found.arena.parts, ready)
-    outcome = conclude(found, model)
+    found, outcome = _with_slow_force(found, conclude(found, model), model)
     chosen = outcome.best.option.refit if outcome.best else None
     agreed = () if chosen is None else agreements(found, chosen)
     causes = tuple(widened(c, agreed) for c in outcome.causes)
@@ -198,6 +199,17 @@ def _simulated(
     if water is not None and water.effect.belongs == "tyre" and not ready[0].vehicle.water:
         notes += (f"On water the drive is likeliest with {term_words(water)}. {_WET}",)
     return supported(evidence), model, bare, roads, untested, notes
+
+
+def _with_slow_force(found: Found, outcome: Outcome[Option], model: Model) -> tuple[Found, Outcome[Option]]:
+    """Where a single drive has no other finding, a force that changes over minutes; several have one each."""
+    evidence = found.arena.evidence
+    if outcome.verdict != "no_effect" or len(evidence.drives) > 1:
+        return found, outcome
+    force = slow_force(evidence.drives[0], evidence.residuals[0], model)
+    return (
+        (found, outcome) if force is None else (replace(found, forms=(force,)), outcome._replace(verdict="unexplained"))
+    )
 
 
 def _gained(

@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.arena import Arena, Field
-from aqualog.diagnose.channels import CHANNELS
+from aqualog.diagnose.channels import CHANNELS, contrasts
 from aqualog.diagnose.compete import Fitted, Posterior
 from aqualog.diagnose.competition import Block
 from aqualog.diagnose.hypotheses import WORTH
@@ -28,6 +29,7 @@ WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
 LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what is large, by the channel's unit
 NOTABLE = 0.05  # probability from which another coordinate is mentioned
 ALIKE = 0.2  # share of the best coordinate's probability from which the drive cannot distinguish another
+_SLIPS = tuple(f"slip_{w}" for w in WHEELS)
 DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points together
 
 
@@ -69,9 +71,10 @@ def clear_forms(field: Field, found: Sets, inner: FloatArray) -> list[Clear]:
 def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
     """Shapes of the best set that no known effect replaces, what explains most first; empty if none is that clear.
 
-    Beside the conditions of `clear_forms`, a mechanism must explain 5 % of a channel's variance. What it explains must
-    be large, or a smooth function twice what a car and its simulation differ by anyway. And no effect of the library
-    may stand for it: a load of a fifth of the car looks like a torque that goes with the torque.
+    Beside the conditions of `clear_forms`, a mechanism must explain 5 % of what the others leave of a channel, or of a
+    difference between axles or sides. What it explains must be large, or a smooth function twice what a car and its
+    simulation differ by anyway. And no effect of the library may stand for it: a load of a fifth of the car looks like
+    a torque that goes with the torque.
     """
     clear = clear_forms(arena, posterior, posterior.tolerant)
     if not clear:
@@ -79,7 +82,7 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     fit = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
     found = []
     for c in clear:
-        is_large, share, channel = _where(arena, c.own, fit)
+        is_large, share, channel = _where(arena, c.own, posterior.best, fit)
         form = described(arena, posterior, posterior.gram, fit, c, channel, share, seed)
         usual = WORTH * arena.shapes[arena.blocks[c.first].tag].mechanism.allowed
         is_large |= not form.manner and bool(np.nan_to_num(np.maximum(form.low, -form.high)).max() >= usual)
@@ -88,31 +91,42 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     return tuple(found)
 
 
-def _where(arena: Arena, members: Sequence[int], fit: Fitted) -> tuple[bool, float, str]:
+def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitted) -> tuple[bool, float, str]:
     """Whether what shapes explain is large, the largest share of a channel's variance, and that channel.
 
-    What the wheels do must show in their slip: a simulator's error in fast movements is in other channels.
+    The share is of what the others of the set leave. Between axles and sides the reference velocity's noise, which is
+    in the slip of all wheels, cancels. What the wheels do must show in their slip: a simulator's error in fast
+    movements is in other channels.
     """
-    before, after, made = [], [], []
-    blocks = [arena.blocks[m] for m in members]
-    sizes = [fit.mean[[fit.columns.index(c) for c in b.columns]] for b in blocks]
-    for i, p in enumerate(arena.parts):
-        drawn = (np.tensordot(x, arena.drawn(i, b), axes=1) for x, b in zip(sizes, blocks, strict=True))
-        f = sum(drawn, np.zeros_like(p.residual))[:, p.mask]
-        y = p.residual[:, p.mask]
-        before.append(y)
-        after.append(y - f)
-        made.append(f)
-    y, left, f = (np.concatenate(x, axis=1) for x in (before, after, made))
-    share = 1.0 - left.var(axis=1) / np.maximum(y.var(axis=1), 1e-30)
-    rms = np.sqrt((f**2).mean(axis=1))
     channels = arena.parts[0].channels
-    large = [
-        bool(r > LEAST[CHANNELS[c].unit] and s > WORTH_TELLING) for r, s, c in zip(rms, share, channels, strict=True)
-    ]
-    of_wheels = arena.shapes[blocks[0].tag].mechanism.name.startswith(("slip", "radius"))
-    every = zip(large, share.tolist(), channels, strict=True)
-    return max((x for x in every if not of_wheels or x[2].startswith("slip")), default=(False, 0.0, channels[0]))
+    names, turned = _with_differences(channels)
+    left, made = [], []
+    for i, p in enumerate(arena.parts):
+        drawn = {m: _drawn(arena, i, m, fit) for m in best}
+        others = sum((x for m, x in drawn.items() if m not in members), np.zeros_like(p.residual))
+        left.append(turned @ (p.residual - others)[:, p.mask])
+        made.append(turned @ sum((drawn[m] for m in members), np.zeros_like(p.residual))[:, p.mask])
+    y, f = np.concatenate(left, axis=1), np.concatenate(made, axis=1)
+    share = 1.0 - (y - f).var(axis=1) / np.maximum(y.var(axis=1), 1e-30)
+    rms = np.sqrt((f**2).mean(axis=1))
+    large = [bool(r > LEAST[CHANNELS[c].unit] and s > WORTH_TELLING) for r, s, c in zip(rms, share, names, strict=True)]
+    of_wheels = arena.shapes[arena.blocks[members[0]].tag].mechanism.name.startswith(("slip", "radius"))
+    every = zip(large, share.tolist(), names, strict=True)
+    return max((x for x in every if not of_wheels or "slip" in x[2]), default=(False, 0.0, channels[0]))
+
+
+def _drawn(arena: Arena, part: int, member: int, fit: Fitted) -> FloatArray:
+    block = arena.blocks[member]
+    return np.tensordot(fit.mean[[fit.columns.index(c) for c in block.columns]], arena.drawn(part, block), axes=1)
+
+
+def _with_differences(channels: tuple[str, ...]) -> tuple[list[str], FloatArray]:
+    """Channels, and after them the differences of axles and sides where each wheel's slip is one. Names, rows (k, C)"""
+    at = [i for i, c in enumerate(channels) if c in _SLIPS]
+    rows = contrasts(channels)[at[1:]] if len(at) == len(_SLIPS) else np.zeros((0, len(channels)))
+    return [*channels, *("axle_slip", "side_slip_f", "side_slip_r")[: len(rows)]], np.concatenate(
+        [np.eye(len(channels)), rows]
+    )
 
 
 def described(

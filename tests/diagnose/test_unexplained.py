@@ -245,6 +245,24 @@ def test_what_the_wheels_do_shows_in_their_slip(mechanism, channel):
     shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == mechanism))
     block = Block("a", "shape", (0,), np.eye(1), 0.0, 0)
     field = SimpleNamespace(parts=(part,), blocks=(block,), shapes=(shape,), drawn=lambda *_: f)
-    is_large, share, where = unexplained._where(field, [0], Fitted([0], np.ones(1), np.eye(1)))
+    is_large, share, where = unexplained._where(field, [0], [0], Fitted([0], np.ones(1), np.eye(1)))
     assert where == channel
     assert (is_large, share > 0.9) == ((True, True) if channel == "kinematic" else (False, False))
+
+
+def test_between_axles_the_noise_of_the_velocity_cancels():
+    """Beside the reference velocity's noise a slip of the rear wheels is nothing; beside the front wheels it is all."""
+    rng = np.random.default_rng(8)
+    own, other = np.zeros((2, 4, 500))
+    own[2:], other[0] = 0.004 * rng.standard_normal(500), 0.1 * rng.standard_normal(500)
+    residual = own + other + 0.1 * rng.standard_normal(500) + 0.001 * rng.standard_normal((4, 500))
+    part = SimpleNamespace(
+        residual=residual, mask=np.ones(500, dtype=bool), channels=("slip_fl", "slip_fr", "slip_rl", "slip_rr")
+    )
+    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == "slip_r"))
+    blocks = tuple(Block(n, "shape", (i,), np.eye(1), 0.0, 0) for i, n in enumerate("ab"))
+    drawn = {"a": own[None], "b": other[None]}
+    field = SimpleNamespace(parts=(part,), blocks=blocks, shapes=(shape,), drawn=lambda _i, b: drawn[b.key])
+    _, share, where = unexplained._where(field, [0], [0, 1], Fitted([0, 1], np.ones(2), np.eye(2)))
+    assert where == "axle_slip"
+    assert share > 0.9  # of what the other member leaves

@@ -1,0 +1,104 @@
+"""A force that changes over minutes: what is slow in the force balance and not in the accelerometer.
+
+Slow noise follows any slow function, so in the competition a smooth function over time is no form. Two channels know
+more: an error of the accelerometer is in the force balance and in the kinematic channel alike, a slope in the
+kinematic one alone, a force in the force balance alone. What remains is compared with what forces on measured cars
+wander by anyway: gusts, bends, the road's surface.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from statistics import NormalDist
+
+import numpy as np
+
+from aqualog.core.errors import ConfigError
+from aqualog.core.records import FloatArray
+from aqualog.diagnose.arena import SHAPE_PRIOR, unit_force
+from aqualog.diagnose.channels import block_step
+from aqualog.diagnose.drive import Drive
+from aqualog.diagnose.records import SURE, Remainder, tempered
+from aqualog.diagnose.shapes import MECHANISMS
+from aqualog.diagnose.unexplained import WORTH_TELLING
+from aqualog.diagnose.unknown_term import describe
+from aqualog.model.term import Model
+
+__all__ = ["slow_force"]
+
+WINDOW_S, LEAST_USED, LEAST_WINDOWS = 10.0, 0.3, 12  # of a mean; share of it that is used; windows of a drive
+USUAL = 0.012  # [m/s^2] sd by which forces wander: of measured trips of one car the largest has 0.012, most 0.005 (S)
+OVER = ("v_x", "torque")  # coordinates whose functions compete already
+
+
+def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None:
+    """The form of a force over time in what a model leaves (C, m) of a drive; None unless its probability is 0.95.
+
+    The evidence is that of a wander of a force's usual size against the usual wander, over windows that count as
+    independent after their own correlation: n (1 - rho) / (1 + rho).
+    """
+    if not {"force_balance", "kinematic"} <= set(drive.channels):
+        return None
+    t, s, whole = _wander(drive, left)
+    near = np.diff(t) < 1.5 * WINDOW_S
+    if s.size < LEAST_WINDOWS or near.sum() < LEAST_WINDOWS // 2:
+        return None
+    slow = float(np.mean((s[1:] * s[:-1])[near]))  # noise of a window is in no other one
+    rho = slow / float(np.mean(s**2))
+    if slow <= USUAL**2 or rho >= 1.0:
+        return None
+    kind = next(m for m in MECHANISMS if m.name == "force")
+    as_force = kind.usual / drive.vehicle.mass
+    each = math.log(USUAL / as_force) + 0.5 * slow * (USUAL**-2 - as_force**-2)
+    nats = s.size * (1.0 - rho) / (1.0 + rho) * each + math.log(SHAPE_PRIOR)
+    chance = 1.0 / (1.0 + math.exp(-min(nats, 700.0)))
+    y, at = left[drive.channels.index("force_balance")], np.arange(left.shape[1]) * block_step(drive.dt)
+    used = y[drive.mask]
+    share = 1.0 - float(np.var(used - np.interp(at, t, whole)[drive.mask]) / max(np.var(used), 1e-30))
+    if chance < SURE or share <= WORTH_TELLING:
+        return None
+    try:
+        by_newton = float(np.mean(unit_force(drive, model, left)[0][drive.mask]))
+    except ConfigError:
+        return None
+    f = whole / by_newton
+    half = (
+        NormalDist().inv_cdf(1.0 - 0.025 / s.size) * math.sqrt(max(float(np.mean(s**2)) - slow, 0.0)) / abs(by_newton)
+    )
+    found = Remainder(
+        "force_balance", ("t",), share, math.nan, t[:, None], f, f - half, f + half, (), None, 0.0, "",
+        kind.name, kind.unit, tempered(chance),
+    )  # fmt: skip
+    return replace(found, sentence=describe(kind, found))
+
+
+def _wander(drive: Drive, left: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Middles of windows [s], and what force balance and wheels against torque show alike there [m/s^2]. Each (k,)
+
+    Means over windows of 10 s, 0 where the two disagree. For the test without their mean and what goes with speed and
+    torque, then as they are.
+    """
+    step = block_step(drive.dt)
+    number = (np.arange(left.shape[1]) * step // WINDOW_S).astype(np.intp)
+    known = drive.mask & np.isfinite(left).all(axis=0)
+    count = np.bincount(number, weights=known)
+    full = np.flatnonzero(count >= LEAST_USED * WINDOW_S / step)
+
+    def mean(x: FloatArray) -> FloatArray:
+        return np.bincount(number, weights=np.where(known, x, 0.0))[full] / count[full]
+
+    force, kinematic = (mean(left[drive.channels.index(c)]) for c in ("force_balance", "kinematic"))
+    over = [mean(drive.coordinates[n]) for n in OVER if n in drive.coordinates]
+    A = np.array([np.ones(full.size), *over, *(x**2 for x in over)]).T
+
+    def own(x: FloatArray) -> FloatArray:
+        return np.asarray(x - A @ np.linalg.lstsq(A, x, rcond=None)[0])
+
+    wheels = force - kinematic
+    return np.asarray((full + 0.5) * WINDOW_S), _alike(own(force), own(wheels)), _alike(force, wheels)
+
+
+def _alike(a: FloatArray, b: FloatArray) -> FloatArray:
+    """The smaller of two values that have the same sign; else 0."""
+    return np.asarray(np.where(a * b > 0.0, np.sign(a) * np.minimum(np.abs(a), np.abs(b)), 0.0))
