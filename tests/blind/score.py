@@ -1,4 +1,5 @@
-"""How well `aqualog diagnose` does on blind cases: one table of measured figures beside their targets.
+"""What `tests.blind.judge` cannot count, on cases of the second simulator made for it: power at the stated limit, pairs of
+effects, relations, the recommended run, the truth's own gain, the detectors.
 
 `python -m tests.blind.score [--metric 1,2,...] [--small] [--jobs 2] [--seeds-from N] [--work DIR] [--json FILE]`
 from the checkout. With `--work` every case is kept as it is done, and a run that was killed goes on from there.
@@ -22,28 +23,31 @@ from tests.blind.metrics.plan import PARTS, Sizes, plan
 from tests.blind.metrics.rows import Row
 from tests.blind.metrics.run import run
 from tests.blind.metrics.store import Store
-from tests.blind.metrics.table import curve_text, measures_text
+from tests.blind.metrics.table import measures_text
 
 NEEDS: dict[int, tuple[str, ...]] = {
-    1: ("null",), 2: ("named",), 3: ("named", "third"), 4: ("weak", "limit"), 5: ("named", "third"), 6: ("pairs",),
-    7: ("twins",), 8: ("twins",), 9: ("compound",), 10: ("null", "named", "third"), 11: ("unknown",),
+    4: ("limit",),
+    6: ("pairs",),
+    7: ("twins",),
+    8: ("twins",),
+    10: ("null", "named"),
     12: ("detector",),
-}  # fmt: skip
+}
 """Parts of the plan that a metric is made from."""
 
 MEASURES = {
-    1: naming.false_discovery, 2: naming.naming, 3: naming.wrong_names, 4: naming.weak, 5: naming.coverage,
-    6: naming.forecasts, 7: naming.confounds, 8: worth.manoeuvres, 9: worth.compounds, 10: worth.gains,
-    11: worth.unknown, 12: worth.detectors,
-}  # fmt: skip
+    4: naming.limits,
+    6: naming.forecasts,
+    7: naming.confounds,
+    8: worth.manoeuvres,
+    10: worth.gains,
+    12: worth.detectors,
+}
 
 
 def measured(rows: Sequence[Row], metrics: Sequence[int]) -> list[Measure]:
-    """All figures of these metrics, with those on honesty and cost that belong to every run."""
-    out = [m for number in metrics for m in MEASURES[number](rows)]
-    if 2 in metrics:
-        out += naming.honesty(rows)
-    return out + worth.speed(rows)
+    """All figures of these metrics, with those on cost that belong to every run."""
+    return [m for number in metrics for m in MEASURES[number](rows)] + worth.speed(rows)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -62,16 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows = run(jobs, Store(given.work), work, processes=given.jobs)
     figures = measured(rows, metrics)
     print(f"{len(rows)} cases, seeds from {given.seeds_from}\n\n{measures_text(figures)}")
-    curve = naming.risk_coverage(rows) if 2 in metrics or 3 in metrics else []
-    if curve:
-        print(f"\n{curve_text(curve)}")
     if given.json:
-        document = {
-            "seeds_from": given.seeds_from,
-            "cases": len(rows),
-            "measures": [asdict(m) for m in figures],
-            "risk_coverage": curve,
-        }
+        document = {"seeds_from": given.seeds_from, "cases": len(rows), "measures": [asdict(m) for m in figures]}
         given.json.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return int(any(m.reached is False for m in figures))
 

@@ -51,9 +51,6 @@ def _worked(job: Job, row: Row) -> Row:
     if len(facts) == 1:
         size = _size(facts[0])
         facts = [replace(facts[0], z=forecast.length(log), p_right=forecast.p_right(found, facts[0].key, size))]
-    elif len(facts) == 2:
-        facts, shared = _two(spec, facts, log, case)
-        row = replace(row, separation=shared)
     row = replace(row, truth=tuple(facts))
     if job.twins:
         # a relation that no run can break is exact by its equations, whatever two drives of the world differ by
@@ -65,10 +62,6 @@ def _worked(job: Job, row: Row) -> Row:
         row = replace(row, pairs=tuple(forecast.pairs_tested(found, log, rng)))
     if case.holdout:
         row = _heldout(row, job, spec, case, found, log)
-    if job.group == "unknown" and found.remainders:
-        first = found.remainders[0]
-        error = gain.function_error(log, first.channel, first.x, first.depends_on, first.f)
-        row = replace(row, function_error=error)
     return replace(row, peak_mb=resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
 
 
@@ -152,13 +145,6 @@ def said_of(causes: Sequence[Cause]) -> list[Said]:
     return [
         Said(*_named(c.effect, c.where), {k: (e.value, e.low, e.high) for k, e in c.parameters.items()}) for c in causes
     ]
-
-
-def _two(spec: Spec, facts: list[Fact], log: forecast.Log, case: Case) -> tuple[list[Fact], float]:
-    """Each of two effects with the size of its own trace, and the share of the one that the other cannot imitate."""
-    traces = [_trace_of(replace(spec, hidden=(h,)), case, log) for h in spec.hidden]
-    z = [float(np.linalg.norm(x)) for x in traces]
-    return [replace(f, z=zi) for f, zi in zip(facts, z, strict=True)], forecast.share_left(*traces)
 
 
 def _trace_of(spec: Spec, case: Case, log: forecast.Log) -> np.ndarray:

@@ -19,7 +19,7 @@ from aqualog.model.term import Model
 from tests.blind.metrics.engine import Drive, Noise, noise_of, prepare, residual, shapes, unit_innovations
 
 __all__ = [
-    "Log", "chance", "clean_trace", "length", "log_of", "p_right", "pairs_tested", "share_left", "span_left", "white",
+    "Log", "chance", "clean_trace", "length", "log_of", "p_right", "pairs_tested", "span_left", "white",
 ]  # fmt: skip
 
 _TINY = 1e-9
@@ -77,12 +77,6 @@ def span_left(x: np.ndarray, others: Sequence[np.ndarray]) -> float:
     _u, s, vt = np.linalg.svd(rows, full_matrices=False)
     inner = vt[s > 1e-6 * s[0]] @ x
     return max(float(x @ x - inner @ inner), 0.0)
-
-
-def share_left(a: np.ndarray, b: np.ndarray) -> float:
-    """Share of the energy of the one trace that the other cannot imitate: 1 - cos^2."""
-    energy = float((a @ a) * (b @ b))
-    return 1.0 - float(a @ b) ** 2 / energy if energy > 0.0 else math.nan
 
 
 def chance(separation: float) -> float:

@@ -1,4 +1,4 @@
-"""Metrics 1 to 7 and the honesty of the verdicts: false discovery, names, intervals, forecasts, confounds."""
+"""Metrics 4 to 7: power at the stated limit, intervals, forecasts, confounds; and how risk falls with coverage."""
 
 from __future__ import annotations
 
@@ -9,86 +9,30 @@ import numpy as np
 
 from aqualog.model.effects import EFFECTS
 from tests.blind.metrics.intervals import bootstrap
-from tests.blind.metrics.measure import Measure, by, right_first, right_or_listed, share
+from tests.blind.metrics.measure import Measure, by, share
 from tests.blind.metrics.rows import Row
 
-__all__ = [
-    "confounds", "coverage", "false_discovery", "forecasts", "honesty", "naming", "risk_coverage", "weak", "wrong_names",
-]  # fmt: skip
+__all__ = ["confounds", "coverage", "forecasts", "limits", "risk_coverage"]
 
-STRONG, SURE = 8.0, 0.95
+STRONG = 8.0
 _BINS = 5
-
-
-def false_discovery(rows: Sequence[Row]) -> list[Measure]:
-    """Metric 1: anything found where nothing is hidden, over all and in the worst cell of noise and programme."""
-    nulls = [r for r in rows if not r.truth and not r.error]
-    out = [share(
-        1, "false discovery, nothing hidden", [r.found for r in nulls],
-        "<= 0.05, upper bound <= 0.075", accept=lambda v, _, high: v <= 0.05 and high <= 0.075, least=400,
-    )]  # fmt: skip
-    out.append(share(1, "p-value below its level", [r.p_value <= 0.01 for r in nulls], "-"))
-    cells = by(nulls, lambda r: f"{r.noise}, {r.programme}")
-    if cells:
-        name, worst = max(cells.items(), key=lambda c: (sum(r.found for r in c[1]) / len(c[1]), len(c[1])))
-        note = f"{name}; {len(cells)} cells"
-        out.append(share(1, "the worst cell", [r.found for r in worst], "<= 0.10", least=10, note=note))
-    for name, group in sorted(by(nulls, lambda r: r.noise).items()):
-        out.append(share(1, f"noise {name}", [r.found for r in group], "<= 0.10", least=10))
-    return out
 
 
 def _singles(rows: Sequence[Row], group: str) -> list[Row]:
     return [r for r in rows if r.group == group and len(r.truth) == 1 and r.truth[0].known]
 
 
-def _isolable(rows: Sequence[Row]) -> list[Row]:
-    """Cases of one effect that is strong and, by the forecast made before the residual was seen, can be told.
-
-    A case that failed has no forecast and counts.
-    """
-    return [r for r in rows if r.error or (r.truth[0].z >= STRONG and r.truth[0].p_right >= SURE)]
-
-
-def naming(rows: Sequence[Row]) -> list[Measure]:
-    """Metric 2: names at z >= 8 where the forecast says that they can be told; a case that failed is a miss."""
-    cases = _isolable(_singles(rows, "named"))
-    effects = by(cases, lambda r: r.truth[0].effect)
-    note = f"{len(effects)} effects"
-    out = [
-        share(2, "right name first", [right_first(r) for r in cases], ">= 0.95", least=300, note=note),
-        share(2, "right name named or left open", [right_or_listed(r) for r in cases], ">= 0.98", least=300),
-    ]  # fmt: skip
-    for effect, group in sorted(effects.items()):
-        places = by([r for r in group if not right_first(r)], _mistake)
-        missed = ", ".join(f"{n} {len(g)}" for n, g in sorted(places.items(), key=lambda c: -len(c[1])))
-        out.append(share(2, f"  {effect}", [right_first(r) for r in group], ">= 0.95", least=10, note=missed))
-    return out
-
-
 def _mistake(row: Row) -> str:
     return row.error.split(":")[0] or ("+".join(c.key for c in row.causes) or row.verdict)
 
 
-def wrong_names(rows: Sequence[Row]) -> list[Measure]:
-    """Metric 3: a name given without reserve that is not hidden; everything that was not detected counts as a case."""
-    out = []
-    for group, text, most in (("named", "moderate sizes", 0.01), ("third", "30 % sizes", 0.03)):
-        cases = _singles(rows, group)
-        out.append(share(3, f"wrong and sure, {text}", [r.wrong for r in cases], f"<= {most}", least=100))
-    return out
-
-
-def weak(rows: Sequence[Row]) -> list[Measure]:
-    """Metric 4: effects of z = 3 ... 5, and the power at the limit that was stated in other logs of the same kind."""
-    cases = [r for r in _singles(rows, "weak") if 3.0 <= r.truth[0].z <= 5.0]
+def limits(rows: Sequence[Row]) -> list[Measure]:
+    """Metric 4: the power at the limit that was stated in other logs of the same kind."""
     at_limit = [r for r in _singles(rows, "limit") if not r.error]
     # a limit that is the smallest size worth naming may be seen more often than it says
     named = [r for r in at_limit if _at_smallest(r)]
     at_limit = [r for r in at_limit if not _at_smallest(r)]
     return [
-        share(4, "wrong and sure at z 3 ... 5", [r.wrong for r in cases], "<= 0.05", least=40),
-        share(4, "found at z 3 ... 5", [r.found for r in cases], "-", least=10**9),
         share(4, "found at the stated limit", [r.found for r in at_limit], "0.85 ... 0.95", least=40),
         share(4, "found at the smallest size worth naming", [r.found for r in named], ">= 0.85", least=20),
     ]
@@ -189,18 +133,12 @@ def _lists(row: Row) -> bool:
     return set(row.members) <= effects
 
 
-def honesty(rows: Sequence[Row]) -> list[Measure]:
-    """Who always abstains is never wrong: how often one name is given where it can be."""
-    cases = _isolable(_singles(rows, "named"))
-    return [share(0, "one name given, z >= 8 and isolable", [r.single for r in cases], ">= 0.8", least=100)]
-
-
 def risk_coverage(rows: Sequence[Row]) -> list[tuple[float, float, float]]:
     """(evidence asked for, share with one name, share of these that is wrong) as ever more evidence is asked for.
 
     The evidence is -log10 of the p-value of the test for anything at all.
     """
-    cases = [r for g in ("named", "third", "weak") for r in _singles(rows, g) if not r.error]
+    cases = [r for r in _singles(rows, "named") if not r.error]
     strength = {r.key: -math.log10(max(r.p_value, 1e-12)) if math.isfinite(r.p_value) else 0.0 for r in cases}
     curve = []
     for least in sorted({round(s, 1) for s in strength.values()}):

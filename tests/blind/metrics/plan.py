@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from tests.blind.world.cases import EXACT_PROGRAMMES, Hidden, Spec
 from tests.blind.world.effects import UNKNOWN as NOT_IN_LIBRARY
 from tests.blind.world.noise import NOISES
-from tests.blind.world.pools import COMPOUNDS, POOLS, SUITED
+from tests.blind.world.pools import POOLS, SUITED
 from tests.blind.world.vehicles import CARS
 
 __all__ = ["KNOWN", "PARTS", "TWINS", "Job", "Sizes", "plan"]
@@ -34,16 +34,12 @@ class Job:
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """Cases of each part: per cell of noise and programme, per effect, per pair of twins, per form."""
+    """Cases of each part: per cell of noise and programme, per effect, per pair of twins."""
 
     null: int = 10
     named: int = 20
-    third: int = 4
-    weak: int = 3
     limit: int = 2
     twins: int = 5
-    compound: int = 120
-    unknown: int = 7
     detector: int = 24
     pairs: int = 24
     duration_s: float = 300.0
@@ -124,15 +120,14 @@ def _null(sizes: Sizes) -> Iterator[Job]:
                 yield _job("null", Spec(programme, noise, (), vehicle=cars[(k + 2 * p + n) % len(cars)]))
 
 
-def _singles(group: str, count: int, scale: float, target_z: float | None) -> Iterator[Job]:
+def _singles(group: str, count: int) -> Iterator[Job]:
     cars = list(CARS)
     # one case of every effect first: whoever stops early has all effects
     for k in range(count):
         for e, name in enumerate(KNOWN):
             hidden, fit = POOLS[name][k % len(POOLS[name])], SUITED[name]
             noise, car = NOISES[(3 * k + 7 * e) % len(NOISES)], cars[(k + k // len(cars) + e) % len(cars)]
-            spec = Spec(fit[(k // len(POOLS[name])) % len(fit)], noise, (hidden,), vehicle=car, scale=scale)
-            yield _job(group, spec, target_z=target_z)
+            yield _job(group, Spec(fit[(k // len(POOLS[name])) % len(fit)], noise, (hidden,), vehicle=car))
 
 
 def _twins(sizes: Sizes) -> Iterator[Job]:
@@ -142,27 +137,6 @@ def _twins(sizes: Sizes) -> Iterator[Job]:
             noise, car = NOISES[(k + 3 * i) % len(NOISES)], cars[(k + i) % len(cars)]
             spec = Spec(t.programme, noise, (t.hidden,), vehicle=car, duration_s=t.duration_s)
             yield _job("twins", spec, target_z=12.0, members=t.members, twins=t.others, can=t.can)
-
-
-def _compound(sizes: Sizes) -> Iterator[Job]:
-    cars = list(CARS)
-    for k in range(sizes.compound):
-        programme, noise = ("mixed", "handling")[k % 2], NOISES[(3 * k + k // 10) % len(NOISES)]
-        yield _job(
-            "compound", Spec(programme, noise, COMPOUNDS[k % len(COMPOUNDS)], vehicle=cars[(k + k // 6) % len(cars)])
-        )
-
-
-def _unknown(sizes: Sizes) -> Iterator[Job]:
-    cars = list(CARS)
-    for k in range(sizes.unknown):
-        for i, name in enumerate(NOT_IN_LIBRARY):
-            programme = SUITED[name][k % len(SUITED[name])]
-            hidden = POOLS[name][k % len(POOLS[name])]
-            yield _job(
-                "unknown",
-                Spec(programme, NOISES[(k + 3 * i) % len(NOISES)], (hidden,), vehicle=cars[(k + i) % len(cars)]),
-            )
 
 
 def _detector(sizes: Sizes) -> Iterator[Job]:
@@ -182,13 +156,9 @@ def _pairs(sizes: Sizes) -> Iterator[Job]:
 
 _MAKERS = {
     "null": _null,
-    "named": lambda s: _singles("named", s.named, 1.0, None),
-    "third": lambda s: _singles("third", s.third, 0.3, None),
-    "weak": lambda s: _singles("weak", s.weak, 1.0, 4.0),
-    "limit": lambda s: _singles("limit", s.limit, 1.0, None),
+    "named": lambda s: _singles("named", s.named),
+    "limit": lambda s: _singles("limit", s.limit),
     "twins": _twins,
-    "compound": _compound,
-    "unknown": _unknown,
     "detector": _detector,
     "pairs": _pairs,
 }  # fmt: skip

@@ -85,7 +85,6 @@ class Row:
     gain: float = float("nan")
     oracle: float = float("nan")
     worse: float = float("nan")
-    function_error: float = float("nan")
     members: tuple[str, ...] = ()  # all that a set which cannot be separated has to list
     second: Second | None = None
     detector: Mapping[str, float] = field(default_factory=dict)

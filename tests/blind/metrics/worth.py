@@ -1,4 +1,4 @@
-"""Metrics 8 to 12: what the verdict is worth: the next manoeuvre, compounds, gain, unknown effects, the detectors."""
+"""Metrics 8 to 12: what the verdict is worth: the next manoeuvre, compounds, gain, the detectors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from tests.blind.metrics.measure import Measure, by, quantity, share
 from tests.blind.metrics.rows import Row
 
-__all__ = ["compounds", "detectors", "gains", "manoeuvres", "speed", "unknown"]
+__all__ = ["compounds", "detectors", "gains", "manoeuvres", "speed"]
 
 STRONG = 8.0
 
@@ -69,27 +69,6 @@ def gains(rows: Sequence[Row]) -> list[Measure]:
             least=50,
         ),
     ]
-
-
-def unknown(rows: Sequence[Row]) -> list[Measure]:
-    """Metric 11: effects that are in no library."""
-    cases = [r for r in rows if r.group == "unknown"]
-    errors = [r.function_error for r in cases if r.verdict == "unexplained"]
-    good = [r for r in cases if math.isfinite(r.oracle) and r.oracle > 0.0]
-    out = [
-        share(11, "unexplained", [r.verdict == "unexplained" for r in cases], ">= 0.90", least=40),
-        share(11, "misnamed", [bool(r.names) for r in cases], "<= 0.05", least=40),
-        quantity(11, "error of the function, median", errors, _median, "<= 0.15", least=20),
-        quantity(11, "share of the oracle's gain, median", [(r.gain if math.isfinite(r.gain) else 0.0) / r.oracle for r in good],
-                 _median, ">= 0.80", least=20),
-    ]  # fmt: skip
-    for name, group in sorted(by(cases, lambda r: r.truth[0].effect).items()):
-        others = [r for r in group if r.verdict != "unexplained"]
-        said = by(others, lambda r: "+".join(r.names) or r.verdict or "failed")
-        note = ", ".join(f"{n} {len(g)}" for n, g in said.items())
-        found = [r.verdict == "unexplained" for r in group]
-        out.append(share(11, f"  {name}", found, ">= 0.90", least=5, note=note))
-    return out
 
 
 def detectors(rows: Sequence[Row]) -> list[Measure]:
