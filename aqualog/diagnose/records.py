@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.model.term import Model, Term
 
@@ -52,6 +53,11 @@ class Cause:
     def key(self) -> str:
         """`tyre_radius@fl`, or the bare name for the whole car."""
         return self.effect if self.where is None else f"{self.effect}@{self.where}"
+
+    @property
+    def name(self) -> str:
+        """By which probabilities add up: wheels are places of one cause, each signal has a cause of its own."""
+        return self.effect if self.where in (*WHEELS, *AXLES, *SIDES) else self.key
 
 
 @dataclass(frozen=True, slots=True)

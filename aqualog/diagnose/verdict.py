@@ -39,8 +39,8 @@ class Candidate(Generic[Option]):
 
     @property
     def names(self) -> frozenset[str]:
-        """Their effects."""
-        return frozenset(c.effect for c in self.large)
+        """Their names."""
+        return frozenset(c.name for c in self.large)
 
 
 class Outcome(NamedTuple, Generic[Option]):
@@ -95,7 +95,7 @@ def decided(
     marginal: dict[tuple[str, Sequence[str]], float] = {}
     for s in sets:
         groups.setdefault(s.names, []).append(s)
-        marginal.update({n: marginal.get(n, 0.0) + s.share for n in {(c.effect, c.drives) for c in s.large}})
+        marginal.update({n: marginal.get(n, 0.0) + s.share for n in {(c.name, c.drives) for c in s.large}})
     ranked = sorted(groups.values(), key=lambda g: -sum(s.share for s in g))
     if not ranked or not ranked[0][0].names:
         return Outcome("no_effect", notes=(*_small(ranked[0][0]), *_likeliest(ranked[1:2])) if ranked else ())
@@ -107,9 +107,10 @@ def decided(
     elsewhere = [c.sentence for c in near if (c.key, c.drives) not in here]
     notes = _small(best) + tuple(dict.fromkeys(f"Equally possible: {s}" for s in elsewhere))
     failed = failing(best)
-    unsure = frozenset(c.effect for c in own if c.probability < SURE)
+    unsure = frozenset(c.name for c in own if c.probability < SURE)
     if not unsure and not failed:
-        return Outcome("named" if len(own) == 1 else "compound", own, (), best, best.names, (), notes)
+        certain = frozenset(c.effect for c in own)
+        return Outcome("named" if len(own) == 1 else "compound", own, (), best, certain, (), notes)
     others, total = [], sum(s.share for s in group)
     rivals, rest = [(best, total)], []
     for g in ranked[1:]:
@@ -122,9 +123,9 @@ def decided(
         ratio = math.exp(min(max(group[0].evidence - g[0].evidence, 0.0), 700.0))
         rivals.append((picked, sum(s.share for s in g)))
         others.append(Alternative(_with_probability(picked.large, marginal), ratio))
-    certain = frozenset() if failed else best.names - unsure
+    certain = frozenset(c.effect for c in own if not failed and c.name not in unsure)
     # the best set whole, one effect at two places too; of the others what it does not have
-    more = {c.effect: c for a in reversed(others) for c in a.causes if c.effect not in best.names}
+    more = {c.name: c for a in reversed(others) for c in a.causes if c.name not in best.names}
     shown = sorted([*own, *more.values()], key=lambda c: c.effect not in certain)
     notes += tuple(f"Not named: {reason}" for reason in failed)
     remain = tuple((s, q / total) for s, q in rivals)
@@ -134,8 +135,8 @@ def decided(
 def _with_probability(
     causes: Sequence[Cause], marginal: Mapping[tuple[str, Sequence[str]], float]
 ) -> tuple[Cause, ...]:  # fmt: skip
-    """The causes with that of their effect at any place, in these drives."""
-    return tuple(replace(c, probability=tempered(marginal.get((c.effect, c.drives), 0.0))) for c in causes)
+    """The causes with that of their name at any place, in these drives."""
+    return tuple(replace(c, probability=tempered(marginal.get((c.name, c.drives), 0.0))) for c in causes)
 
 
 def _likeliest(groups: Sequence[Sequence[Candidate[Option]]]) -> list[str]:

@@ -45,6 +45,13 @@ def test_the_same_names_at_other_places_count_together():
     assert found.notes == ("Equally possible: drag r.",)
 
 
+def test_another_signal_is_another_cause():
+    found = verdict([([cause("delay", "v_x")], 0.0), ([cause("delay", "a_x")], -1.0), ([cause("slope")], -15.0)])
+    assert found.verdict == "cannot_tell"
+    assert [(c.key, round(c.probability, 2)) for c in found.causes] == [("delay@v_x", 0.73), ("delay@a_x", 0.27)]
+    assert (found.certain, found.notes) == (frozenset(), ())
+
+
 def test_a_cause_of_one_drive_has_the_probability_that_this_drive_has_it():
     (a, large), b = cause("drag"), cause("slope")
     in_d1, in_d2 = (replace(a, drives=(d,)) for d in ("d1", "d2"))
