@@ -274,8 +274,8 @@ def _slalom() -> Scenario:
 
 
 _SCENES: dict[str, Callable[[], Scenario]] = {
-    # full aquaplaning: front right spins down, rear right spins up; 0.8 mm, as the passes with spin-ups (C28)
-    "2.8": lambda: _sedan(118.0, entry_s=23.0, on_lane_s=4.0, a=2.0),
+    # full aquaplaning: front right spins down, rear right spins up; 0.8 mm (C28)
+    "2.8": lambda: _sedan(118.0, entry_s=23.0, on_lane_s=4.0, a=0.5),
     # minor spin-downs of the front right wheel from the entry on, almost constant speed; 0.8 mm, 23 s (C33)
     "2.9": lambda: _sedan(104.0, entry_s=23.0, on_lane_s=5.0),
     "2.21": _deceleration,
