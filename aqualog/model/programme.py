@@ -115,10 +115,8 @@ def _drives() -> Iterator[_Drive]:
     def third(case: _Case, figures: str) -> Iterator[_Drive]:
         return ((case, v, 0.0, 2, "constant", figures) for v in BINNED)
 
-    def binned(case: _Case, figures: str, speeds: tuple[int, ...] = BINS) -> Iterator[_Drive]:
-        return (
-            (case, v, a, 0, "acceleration" if a else "constant", figures) for v in speeds for a in REGRESSED
-        )  # fmt: skip
+    def binned(case: _Case, figures: str, speeds: tuple[int, ...] = BINS, k: int = 0) -> Iterator[_Drive]:
+        return ((case, v, a, k, "acceleration" if a else "constant", figures) for v in speeds for a in REGRESSED)
 
     yield from constant(worn, CONSTANT, 3, "2.3,2.4,2.10,2.14,2.17")
     yield from accelerated(worn, (70, 80, 90, 100, 110, 120), (1.0,), "2.4")
@@ -176,6 +174,8 @@ def _drives() -> Iterator[_Drive]:
     for pressure in ("medium", "high"):
         yield from third(_Case(pressure=pressure), "2.14")
     yield from constant(worn, BETWEEN, 3, "2.4")  # the thesis has passes at more speeds than it shows over time
+    for k in (1, 2):  # five drives a bin leave the scatter of the slope above what a fall would be
+        yield from binned(_Case("new_winter"), "2.19", k=k)
 
 
 def _run(case: _Case, kmh: float, a: float, repeat: int, manoeuvre: str, figures: str, seed: int) -> Run:
