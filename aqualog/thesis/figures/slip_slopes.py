@@ -349,10 +349,10 @@ def _c54(found: Slopes) -> Check | None:
     if not rows:
         return None
     level = [r for r in rows if r[2].is_none(_NONE) or r[2].is_above]
-    falling = [r for r in rows if r[1].value < 0.0]
+    falling = [r for r in rows if r[1].is_below]
     less = [r for r in rows if r[2].value > r[1].value / 3.0]
     worst = min((r[2] for r in rows), key=lambda e: e.low)
-    whole = len(level) == len(falling) == len(less) == len(rows)
+    whole = len(level) == len(rows) and len(falling) == len(rows)
     outcome = "; ".join(f"{n}: worn {a.words(1)}, less worn {b.words(1)} %" for n, a, b in rows)
     part = len(less) == len(rows)
     fields = {"still": len(level), "all": len(rows), "falling": len(falling)}
