@@ -13,7 +13,7 @@ from aqualog.core.notation import SIDES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect import cusum, other_surface
-from aqualog.detect.braking import began_free, hold_on, lasting
+from aqualog.detect.braking import UNLOGGED, began_free, hold_on, lasting
 from aqualog.detect.cusum import CusumParams
 from aqualog.detect.detector import Detector, Needs, Output, Scene, Setup, missing_wheels, traction
 from aqualog.detect.events import AFTER
@@ -164,7 +164,7 @@ class JointCriteriaWatch:
         features = {f"criterion_{k}": b.astype(np.float64) for k, b in found.met.items()}
         features["joint_gate"] = gate.astype(np.float64)
         features[FULL] = found.is_full.astype(np.float64)
-        shared = {GATE: gate, GATE_AFTER: after, MAY_BE_WATER: slope, ROTATES: rotates}
+        shared = {GATE: gate | stopped, GATE_AFTER: after, MAY_BE_WATER: slope, ROTATES: rotates}
         return Output(((track, evidence),), features, shared)
 
     def _may_be_water(self, scene: Scene, x: FloatArray) -> BoolArray:
@@ -178,13 +178,15 @@ class JointCriteriaWatch:
         """Where a braked wheel slides and goes on slowing down although its brake is let off. (n,)
 
         A road, and be it ice, turns such a wheel up again: its friction is a negative traction. Only water stops it.
+        A light braking that may be in no torque shuts the gate as well.
         """
         f, stopped = scene.f, np.zeros(scene.size, dtype=bool)
+        light = scene.braking.get(UNLOGGED, stopped)
         for w in scene.wheels:
             if f"mu_{w}" not in f:
                 continue
             with np.errstate(invalid="ignore"):
-                slides = scene.braking[w] & (f["v_x_hat"] > V_STOPPED) & (f["a_kin_slow"] > A_STOPPED)
+                slides = (scene.braking[w] | light) & (f["v_x_hat"] > V_STOPPED) & (f["a_kin_slow"] > A_STOPPED)
                 slides &= slip_of_wheel_speed(f[f"v_w_{w}"], f["v_x_hat"]) < SLIP_STOPPED
                 slows = slides & (f[f"mu_{w}"] > 0.0)
             least = max(2, round(HELD_S / self._dt))

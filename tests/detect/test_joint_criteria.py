@@ -225,6 +225,14 @@ def test_water_is_found_while_stability_control_brakes_single_wheels(seed, kind)
     assert episode_study.controlled(f"dry {kind}", seed, episode_study.SCORING_POOL)[1] == []
 
 
+def test_water_is_found_under_a_light_braking_that_may_be_in_no_torque():
+    """A driver who rolls brakes with half a bar; the resistance is not judged, and both front wheels stop."""
+    drawn = situations.draw("lane_coasting", 20086, episode_study.SCORING_POOL)
+    found = detect_drive(as_signals(simulate(drawn.scenario, drawn.model), vehicle=drawn.believed), drawn.believed)
+    assert not found.features["joint_gate"].to_numpy()[1405:1700].any()
+    assert [e.start_s < 14.6 for e in found.events if e.detector == "joint_criteria"] == [True]
+
+
 def test_a_log_that_begins_on_water():
     """Its offset is learnt in water, and no minor spin-down begins in the first three seconds."""
     found = detect_drive(drive(duration_s=7.0, lanes=(lane(0.0, 5.0),), speed_kmh=((0.0, 92.0),), seed=2)[0], CAR)

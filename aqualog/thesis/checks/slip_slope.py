@@ -21,7 +21,7 @@ from aqualog.model.scenario import SURFACES, Lane, Profile, Scenario
 from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
 from aqualog.thesis.checks.resistance import CONFIGURATIONS, LOADED, SLOW, UNLOADED, at_speeds
-from aqualog.thesis.checks.spins import SOON
+from aqualog.thesis.checks.spins import full_speed
 from aqualog.thesis.claims import NEEDS_DATA, Check, Checks, judge, limit
 from aqualog.thesis.evidence.drives import drives, made, variants
 from aqualog.thesis.evidence.passes import HIGH, LOW, MEDIUM, SLOPE_EDGES, Pass, figures_of, initial_slope
@@ -37,7 +37,6 @@ from aqualog.thesis.evidence.seeds import (
     by_passes,
     cells_of,
     estimate,
-    first_speed,
     mean,
     mean_of,
     said,
@@ -52,7 +51,7 @@ __all__ = ["CHECKS"]
 WORN = Pass(94, wiggles=True)
 VERY_WORN = Pass(100, tyre="very_worn_summer", h=0.8e-3, wiggles=True)
 DRY_VERY_WORN = Pass(80, tyre="very_worn_summer", h=0.0, wiggles=True)
-FULL_GRID = tuple(replace(VERY_WORN, kmh=v, wiggles=False) for v in range(104, 140, 4))  # half stop, as in C17
+FULL_GRID = tuple(replace(VERY_WORN, kmh=v, wiggles=False) for v in range(104, 140, 4))
 FALLING = ("very worn", "very worn 0.6 mm", "very worn 2.0 mm", "worn", "worn medium", "worn high")
 DEPTHS = (0.8e-3, 1.1e-3, 1.3e-3, 2.0e-3)  # [m]
 RAMPS = tuple(Pass(v, a=1.0, wiggles=True) for v in (78, 94))
@@ -73,8 +72,7 @@ def slopes_of(table: Table, p: Pass, speeds: Sequence[float], wheel: str = "rr")
 def _c48(table: Table) -> Check:
     wet, dry = table[VERY_WORN].of("slope_rr"), mean(table[DRY_VERY_WORN].of("slope_rr"))
     value, ci = estimate(lambda r: mean(wet[r]) / dry, wet.size)
-    stopped = cells_of(table, FULL_GRID, "stop_s") < SOON
-    full, full_ci = estimate(first_speed([p.kmh for p in FULL_GRID], stopped), wet.size)
+    full, full_ci = estimate(full_speed(table, FULL_GRID), wet.size)
     is_near = abs(full - VERY_WORN.kmh - BELOW_FULL) <= BELOW_TOLERANCE
     outcome = f"{mean(wet):.1f} of {dry:.1f}: {told(value, ci, 2)}; full aquaplaning at {told(full, full_ci)} km/h"
     late = "" if is_near else " This tyre floats fully at another speed than the thesis reports of its own."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,11 +28,13 @@ from aqualog.thesis.evidence.seeds import (
     told,
 )
 
-__all__ = ["CHECKS"]
+__all__ = ["CHECKS", "full_speed"]
 
 GRID = tuple(range(78, 126, 4))  # [km/h]
 DRY = Pass(80, h=0.0, wiggles=True)
 FLOODED = Pass(150, even=True, scatter=0.0)
+FINE = tuple(range(84, 124, 2))
+CONSTANT = tuple(Pass(v) for v in FINE)
 KICKED = tuple(Pass(v, kick=T) for T in (1000.0, 2000.0) for v in range(70, 140, 6))
 SOON, RESISTANCE, SLOPE_LOSS = 0.5, 0.2, 0.2  # [s], [m/s^2], [-]
 NO_FORCE, OVERLOAD_S = limit("no_force", "C4.passes_full"), limit("overload_s", "C4.passes_partial")  # [-], [s]
@@ -61,10 +64,17 @@ def _c3(table: Table) -> Check:
     return judge("C3.passes", outcome, whole=whole, part=part, value=lead, ci95=ci)
 
 
+def full_speed(table: Table, passes: Sequence[Pass]) -> Statistic:
+    """Speed of full aquaplaning of passes that differ in speed alone: half of them stop a front wheel. [km/h]"""
+    return first_speed([p.kmh for p in passes], cells_of(table, passes, "any_stop") > 0.5)
+
+
 def _c4(table: Table) -> Checks:
     force = max(float(table[p].of("afloat_force").max()) for p in (FLOODED, Pass(118), Pass(122)))
     spun = cells_of(table, KICKED, "rear_spin").ravel() > SPUN
-    partial = cells_of(table, KICKED, "rear_contact").ravel()[spun] > CONTACT_FULL
+    full = full_speed(table, CONSTANT)(np.arange(len(table[CONSTANT[0]].figures)))
+    slower = np.repeat([p.kmh < full for p in KICKED], spun.size // len(KICKED))
+    partial = cells_of(table, KICKED, "rear_contact").ravel()[spun & slower] > CONTACT_FULL
     overloaded = cells_of(table, KICKED, "overload_s").ravel() > OVERLOAD_S
     hit, spared = (float(x.mean()) if x.size else 0.0 for x in (overloaded[spun], ~overloaded[~spun]))
     balanced = 0.5 * (hit + spared)
@@ -72,8 +82,8 @@ def _c4(table: Table) -> Checks:
     ok = n > 0 and k >= 0.8 * n
     most = f"at most {force:.2e} of the load (118, 122 and 150 km/h)"
     outcome = (
-        f"{k} of {n} begin with contact left; balanced accuracy {balanced:.3f} over {spun.size} passes, found "
-        f"{hit:.3f}, spared {spared:.3f}"
+        f"{k} of {n} below {full:.1f} km/h begin with contact left; balanced accuracy {balanced:.3f} over {spun.size} "
+        f"passes, found {hit:.3f}, spared {spared:.3f}"
     )
     whole, value = ok and balanced >= 0.9, k / n if n else None
     return (
@@ -93,7 +103,6 @@ def _c5(table: Table) -> Check:
     return judge("C5.passes", outcome, whole=stops == times.size, part=2 * stops >= times.size, value=middle, ci95=ci95)
 
 
-FINE = tuple(range(84, 124, 2))
 SHOWN = (89, 98, 106, 118)  # thesis Fig. 2.3
 CURVE = tuple(Pass(v) for v in (70, *GRID[:9]))  # up to 110 km/h, below full aquaplaning
 CURVE_A = tuple(Pass(v, a=0.5) for v in (78, 86, 94, 102))
@@ -148,11 +157,9 @@ def _c16(table: Table) -> Check:
 
 
 def _c17(table: Table) -> Check:
-    cells = [Pass(v) for v in FINE]
-    minor = first_speed(FINE, cells_of(table, cells, "dips") > 0)
-    stop = cells_of(table, cells, "stop_s") < SOON
-    full = first_speed(FINE, stop)
-    n = stop.shape[1]
+    dips = cells_of(table, CONSTANT, "dips")
+    minor, full = first_speed(FINE, dips > 0), full_speed(table, CONSTANT)
+    n = dips.shape[1]
     value, ci = estimate(lambda r: full(r) - minor(r), n)
     there = np.isfinite(value)
     outcome = f"full {said(full, n)}, first dip {said(minor, n)}: {told(value, ci)} km/h"
@@ -334,13 +341,13 @@ def _c6(table: Table) -> Check:
 CHECKS = (
     by_passes("C6", lambda: (p for passes in _FACTORS.values() for p in passes), _c6),
     by_passes("C3", lambda: (DRY, *(Pass(v, wiggles=w) for v in GRID for w in (False, True))), _c3),
-    by_passes("C4", lambda: (FLOODED, Pass(118), Pass(122), *KICKED), _c4),
+    by_passes("C4", lambda: (FLOODED, Pass(118), Pass(122), *KICKED, *CONSTANT), _c4),
     by_passes("C5", lambda: (FLOODED,), _c5),
     by_passes("C13", lambda: (Pass(v) for v in SHOWN), _c13),
     by_passes("C14", lambda: (Pass(89),), _c14),
     by_passes("C15", lambda: (Pass(v) for v in SHOWN[:3]), _c15),
     by_passes("C16", lambda: (Pass(118),), _c16),
-    by_passes("C17", lambda: (Pass(v) for v in FINE), _c17),
+    by_passes("C17", lambda: CONSTANT, _c17),
     by_passes("C18", lambda: (*CURVE, *CURVE_A), _c18),
     by_passes("C19", lambda: NEW_WINTER, _c19),
     by_passes("C20", lambda: (Pass(v, kick=T) for v in KICK_SPEEDS for T in KICKS), _c20),

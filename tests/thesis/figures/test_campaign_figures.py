@@ -22,7 +22,7 @@ from aqualog.thesis.evidence import measures
 from aqualog.thesis.evidence.measures import Effect
 from aqualog.thesis.evidence.selection import Level, NotInCampaign, choose, label, pairs, value_of, wear_rank
 from aqualog.thesis.export import figure_csv, figures_document
-from aqualog.thesis.figures import joint, resistance, spin_downs
+from aqualog.thesis.figures import joint, resistance, slip_slopes, spin_downs
 from aqualog.thesis.page import render_figures
 from aqualog.thesis.run import make
 from tests.thesis.small_campaign import evidence, folder, made_of_campaign
@@ -387,3 +387,15 @@ def test_slips_of_the_free_wheels_are_those_of_3_13():
     slips = np.concatenate([line.y for line in panel.lines])
     assert slips.min() >= -10.0
     assert panel.y.limits == (-10.5, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("worn", "deep", "verdict"),
+    [(-6.0, (-0.3, -0.9, 0.2), REPRODUCED), (-6.0, (-1.3, -2.2, -0.4), DIFFERENCE), (1.0, (0.5, -0.9, 1.2), DIFFERENCE),
+     (-3.0, (-1.2, -1.9, -0.5), NOT_REPRODUCED)],
+)  # fmt: skip
+def test_c54_new_winter_tyres_do_not_fall_and_worn_ones_do(monkeypatch, worn, deep, verdict):
+    found = SimpleNamespace(levels=(), wheels=("rl",), selected=SimpleNamespace(wish=None), of=lambda level, _: level)
+    monkeypatch.setattr(slip_slopes, "pairs", lambda *_: [("2 mm", Effect(worn, worn - 7.0, worn + 5.0, 9), Effect(*deep, 9))])
+    monkeypatch.setattr(slip_slopes, "fall", lambda level: level)
+    assert slip_slopes._c54(found).verdict == verdict
