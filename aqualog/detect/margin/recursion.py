@@ -246,7 +246,7 @@ def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
             m.evidence[law, i] *= keep
             if heard:
                 at = law * _NN + n
-                below, above = p.weight * nodes[at], p.weight * nodes[at + 1]
+                below, above = p.weight * (nodes[at] + t.ways[law, n]), p.weight * (nodes[at + 1] + t.ways[law, n + 1])
                 m.evidence[law, i] = m.evidence[law, i] + (1.0 - a) * below + a * above
 
 

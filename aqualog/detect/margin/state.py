@@ -69,7 +69,7 @@ class FilterParams(NamedTuple):
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
     heard: float = 1e-3  # [-] probability of water from which its distances are compared
     weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay
-    law_R: float = 0.5  # [-] by which the laws of resistance may differ beyond what was drawn
+    law_R: float = 0.4  # [-] by which the laws of resistance may differ beyond what was drawn
     law_M: float = 1.4  # [-] the same of the log variances
     calm: float = 0.3  # [-] of water so even, or of wheels that a control holds so still, that none shakes (K)
     calm_road: float = 0.05  # [-] the same among wet roads: water far from full aquaplaning shakes none anyway
@@ -99,7 +99,8 @@ class Inputs(NamedTuple):
 
 class Emissions(NamedTuple):
     """Mean by covariates (laws, nodes, features, covariates) and covariance (laws, nodes, features, features) at each
-    distance, by laws of lost contact with shares `law` (laws,).
+    distance, by laws of lost contact with shares `law` (laws,), each of them twice: front wheels that the torque spins,
+    and such that the water stops. `ways` (laws, nodes): logarithm of the share of those.
 
     `contact` (laws, nodes) [-] of the front axle; `prior` (full speeds,). `kind_` the same of kinds of road. `road`: 0
     dry, 1 wet, 2 snow, ice or gravel; the shares of each sum to 1.
@@ -108,6 +109,7 @@ class Emissions(NamedTuple):
     mean: FloatArray
     scatter: FloatArray
     contact: FloatArray
+    ways: FloatArray
     law: FloatArray
     prior: FloatArray
     kind_mean: FloatArray
