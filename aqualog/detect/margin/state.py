@@ -69,7 +69,7 @@ class FilterParams(NamedTuple):
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
     heard: float = 1e-3  # [-] probability of water from which its distances are compared
     weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay
-    law_R: float = 0.4  # [-] by which the laws of resistance may differ beyond what was drawn
+    law_R: float = 0.5  # [-] by which the laws of resistance may differ beyond what was drawn
     law_M: float = 1.4  # [-] the same of the log variances
     calm: float = 0.3  # [-] of water so even, or of wheels that a control holds so still, that none shakes (K)
     calm_road: float = 0.05  # [-] the same among wet roads: water far from full aquaplaning shakes none anyway
