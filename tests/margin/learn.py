@@ -41,6 +41,7 @@ WET = 0.6  # [-] log ratio up to which water counts as such
 STOPS_AT = 0.93  # a free wheel stops at about this share of the speed at which its contact ends
 LAW_SD = 0.20  # [-] log of a tyre's full speed about a law
 BANDWIDTH = 0.06  # [-] of the log ratio
+SHARP = 1.0  # how surely a slip of 1 in its feature tells which way a wheel goes
 SHARES = (0.6, 0.1, 0.3)  # of `LAWS` (K)
 KINDS = 8  # of dry road, as many of wet, and of other surfaces
 LEAST = 1e-3  # [-] of a variance
@@ -48,17 +49,19 @@ _N, _Z = len(state.FEATURES), state.COVARIATES
 _TAIL = FilterParams._field_defaults["tail"]
 NEUTRAL = Emissions(
     np.zeros((1, NODES.size, _N, _Z)), np.tile(1e9 * np.eye(_N), (1, NODES.size, 1, 1)), np.ones((1, NODES.size)),
-    np.ones(1), np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((2, _N, _Z)), np.tile(1e9 * np.eye(_N), (2, 1, 1)),
+    np.zeros((1, NODES.size)), np.ones(1), np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((2, _N, _Z)), np.tile(1e9 * np.eye(_N), (2, 1, 1)),
     np.ones(2), np.array([0.0, 1.0]),
 )  # fmt: skip
 
 
-def laws_of(x, z, where):
-    """Mean by covariates and covariance at each node, where the log speed ratio (n,) is: regression by Student's law."""
+def laws_of(x, z, where, share):
+    """Mean by covariates and covariance at each node, where the log speed ratio (n,) is: regression by Student's law.
+
+    `share` (n,): how much each window counts."""
     mean, scatter = np.empty((NODES.size, _N, _Z)), np.empty((NODES.size, _N, _N))
     for k, node in enumerate(NODES):
         away = where - node
-        near = np.exp(-0.5 * (away / BANDWIDTH) ** 2)
+        near = share * np.exp(-0.5 * (away / BANDWIDTH) ** 2)
         form = np.column_stack([z, away])
         w = near
         for _ in range(6):
@@ -199,12 +202,16 @@ def prior(rng, n=4000):
 
 
 def of_law(rows):
-    """Mean, covariance and contact share at each distance, of windows of one law of contact."""
+    """Mean, covariance, contact share and log of the share at each distance, of windows of one law of contact: of front
+    wheels that slip ahead of the rear ones, then of those that slip behind."""
     ratio, x = rows[:, 3], rows[:, 5:]
     near = np.exp(-0.5 * ((ratio - NODES[:, None]) / BANDWIDTH) ** 2)
     # far away the mean of few tyres wavers; contact only grows with distance
     contact = np.maximum.accumulate(near @ rows[:, 4] / near.sum(axis=1))
-    return *laws_of(x[:, :_N], x[:, _N:], ratio), contact
+    for sign in (1.0, -1.0):
+        share = 1.0 / (1.0 + np.exp(-sign * SHARP * x[:, 1]))  # a small slip may be either
+        ways = np.log(near @ share / near.sum(axis=1))
+        yield *laws_of(x[:, :_N], x[:, _N:], ratio, share), contact, ways
 
 
 def learn(found, same_roads=False):
@@ -214,8 +221,8 @@ def learn(found, same_roads=False):
     for d, drivetrain in enumerate(DRIVETRAINS):
         own = found[found[:, 0] == d]
         road, law, ratio, x = own[:, 1], own[:, 2], own[:, 3], own[:, 5:]
-        by_law = [of_law(own[(road == 1) & (law == k)]) for k in range(len(LAWS))]
-        distances = (*(np.array(each) for each in zip(*by_law, strict=True)), np.array(SHARES), before)
+        by_law = [way for k in range(len(LAWS)) for way in of_law(own[(road == 1) & (law == k)])]
+        distances = (*(np.array(each) for each in zip(*by_law, strict=True)), 0.5 * np.repeat(SHARES, 2), before)
         if same_roads:
             tables[drivetrain] = Emissions(*distances, *emissions.emissions_of(drivetrain)[len(distances) :])
             continue

@@ -31,6 +31,8 @@ DT = 0.01
 LAWS = ((1.5, 6.0), (0.1, 1.5), (6.0, 20.0))
 STOP_L = 0.13  # [-] contact share at which a free wheel stops
 FOREIGN_FROM = 500_000  # seeds of the other simulator, so that no number is used twice
+# exponents of film and load of full aquaplaning: Horne's, Gallaway's, Yager's and USF's, PAVDRN's, Gengenbach's
+PUBLISHED = ((0.0, 0.0), (0.06, 0.0), (0.06, 0.2), (0.26, 0.0), (0.5, 0.5))
 _SPEEDS = np.arange(30.0, 260.0, 0.25) * KMH
 
 
@@ -145,18 +147,30 @@ def own_pass(
 def foreign_full(car, depth: float) -> float:
     """Full aquaplaning of a free front wheel of the other simulator. [m/s]"""
     F_z, gain = float(car.static[0]), float(car.contact_gain[0])
-    lost = np.array([min(foreign.lost_share(v, depth, F_z, 4000.0) * gain, 1.0) for v in _SPEEDS])
-    push = np.array([foreign.water_push(v, depth) for v in _SPEEDS]) * float(car.water_gain[0])
+    lost = np.array([min(foreign.lost_share(v, depth, F_z, 4000.0, car.law) * gain, 1.0) for v in _SPEEDS])
+    push = np.array([foreign.water_push(v, depth, car.law) for v in _SPEEDS]) * float(car.water_gain[0])
     pace = _SPEEDS / 30.0
     rolling = float(car.roll_0[0]) + car.roll_1 * pace + car.roll_4 * pace**4
     return first_stop(0.78 * float(car.mu[0]) * (1.0 - lost) * F_z, 0.6 * push + rolling * F_z)
 
 
+def drawn_law(rng: np.random.Generator) -> np.ndarray:
+    """A law of water for `tests.blind.multibody`, each part drawn by itself from published forms, as its `LAW`."""
+    depth_load = PUBLISHED[int(rng.integers(len(PUBLISHED)))]
+    contact = ((0.0, 1.0, rng.uniform(1.5, 6.0)), (rng.uniform(0.1, 0.5), 0.6, 1.0))[int(rng.integers(2))]
+    drag = rng.uniform(30.0, 250.0), (1.0, 0.5)[int(rng.integers(2))], (2.0, 1.0)[int(rng.integers(2))]
+    return np.array([rng.uniform(24.0, 42.0), *depth_load, *contact, *drag, rng.uniform(1.0, 2.0)])
+
+
 def foreign_pass(
-    seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE, run: int = 0
-) -> Pass:
-    """A pass of `tests.blind.multibody`: other contact, drag and tyre laws, another driver and other sensors."""
-    rng = np.random.default_rng([seed + FOREIGN_FROM, 78])
+    seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE, run: int = 0,
+    any_law: bool = False,
+) -> Pass:  # fmt: skip
+    """A pass of `tests.blind.multibody`: other contact, drag and tyre laws, another driver and other sensors.
+
+    `any_law`: with a law of water by `drawn_law` instead of its own.
+    """
+    rng = np.random.default_rng([seed + FOREIGN_FROM, 80 if any_law else 78])
     away = rng.uniform(*distance)
     while True:
         car, drive = draw_car(rng)
@@ -167,6 +181,7 @@ def foreign_pass(
         own = of_the_day(car, rng)._replace(
             contact_gain=np.full(4, gains[0]), water_gain=np.full(4, gains[1]), track_film=rng.uniform(2e-4, 6e-4)
         )
+        own = own._replace(law=drawn_law(rng)) if any_law else own
         depth = float(np.exp(rng.uniform(np.log(0.6e-3), np.log(6e-3))))
         full = foreign_full(own, depth)
         v = full - away

@@ -44,12 +44,14 @@ def test_emissions_are_a_law(drivetrain):
     t = emissions_of(drivetrain)
     assert (np.diff(t.contact) >= 0.0).all()
     assert (t.contact[:, -1] > t.contact[:, 0] + 0.3).all()
-    usual, early, late = t.contact[:, np.argmin(np.abs(NODES - 0.3))]
+    usual, early, late = t.contact[::2, np.argmin(np.abs(NODES - 0.3))]
     assert early < usual < late
+    assert np.logaddexp(t.ways[::2], t.ways[1::2]) == pytest.approx(0.0, abs=1e-3)
     at = t.mean @ np.array([1.0, 0.0, np.arcsinh(1.5)])  # 108 km/h, a steady car
     near, far = (int(np.argmin(np.abs(NODES - x))) for x in (0.0, 0.6))
-    assert (np.abs(at[:, near]) > np.abs(at[:, far])).all()
-    assert (t.law @ (np.abs(at[:, near]) - np.abs(at[:, far])) > 0.3).all()
+    size = (np.exp(t.ways)[:, :, None] * np.abs(at)).reshape(3, 2, NODES.size, 5).sum(axis=1)
+    assert (size[:, near] > size[:, far]).all()
+    assert (2.0 * t.law[::2] @ (size[:, near] - size[:, far]) > 0.3).all()
     assert (np.linalg.eigvalsh(np.concatenate([*t.scatter, t.kind_scatter])) > 0.0).all()
     assert (t.prior.sum(), t.law.sum()) == pytest.approx((1.0, 1.0), abs=1e-3)
     p = params(CAR, 0.1)
@@ -73,17 +75,20 @@ def test_emissions_are_those_of_these_features(drivetrain):
         p = own_pass(300 + seed, drivetrain)
         x = windows(p.columns, p.vehicle, p.dt, p.wet)[round((p.wet[0] + 2.0) / 0.1)]
         node = int(np.argmin(np.abs(np.log(p.v_full / 30.0) - x[6] - NODES)))
-        left = x[:5] - t.mean[0, node] @ x[5:]
-        squares.append(left @ np.linalg.solve(t.scatter[0, node], left))
+        way = int(x[1] < 0.0)  # of the usual law
+        left = x[:5] - t.mean[way, node] @ x[5:]
+        squares.append(left @ np.linalg.solve(t.scatter[way, node], left))
     assert np.nanmedian(squares) < CHI2_95
 
 
 def test_a_mixture_of_laws_is_between_them():
     q, t = own_pass(12, "rwd"), emissions_of("rwd")
     p, x, k = params(q.vehicle, q.dt), inputs_of(q.columns, q.vehicle, q.dt), round((q.wet[0] + 2.0) / q.dt)
-    each = [t._replace(law=law) for law in (t.law, *np.eye(3))]
-    mixed, *alone = (scan(p, own, Filter.new(p, own), x)[0][-1, k] for own in each)
+    each = [t._replace(law=law) for law in (t.law, *0.5 * np.repeat(np.eye(3), 2, axis=1))]
+    each.insert(1, t._replace(ways=t.ways[::-1]))
+    mixed, rare, *alone = (scan(p, own, Filter.new(p, own), x)[0][-1, k] for own in each)
     assert min(alone) + 0.5 < mixed < max(alone) - 0.5
+    assert abs(rare - mixed) > 0.2  # how rare each way is counts
 
 
 def test_a_wet_drive_has_a_distance_and_a_warning(wet):
@@ -120,6 +125,18 @@ def test_slips_of_full_aquaplaning_count_where_nothing_shakes():
         recursion._scores(t.mean, t.scatter, z, x, P, 6.0, *work, score[k])
     never, sometimes = score[:, near] - score[:, far]
     assert sometimes > max(never + 1.5, 3.0)
+
+
+@pytest.mark.parametrize(("drivetrain", "ahead"), [("awd", 0.3), ("fwd", 0.9), ("rwd", 0.0)])
+def test_front_wheels_that_are_driven_may_spin_or_stop(drivetrain, ahead):
+    """Near full aquaplaning both slip far; one law of both would hold whatever lies between."""
+    t, node = emissions_of(drivetrain), int(np.argmin(np.abs(NODES)))
+    slip = t.mean[:, node, 1] @ np.array([1.0, 0.0, np.arcsinh(1.5)])
+    assert (slip[1::2] < -2.5).all()
+    if ahead:
+        assert (slip[::2] > 2.0).all()
+    assert np.exp(t.ways[::2, node]).mean() == pytest.approx(ahead, abs=0.15)
+    assert (t.scatter[:, node, 1, 1] < 16.0).all()
 
 
 def test_document_and_page(wet):

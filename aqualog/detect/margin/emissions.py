@@ -17,7 +17,7 @@ from aqualog.detect.margin.state import Emissions
 
 __all__ = ["emissions_of"]
 
-VERSION = 2
+VERSION = 3
 
 
 @lru_cache(maxsize=3)

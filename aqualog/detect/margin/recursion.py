@@ -105,7 +105,6 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
         r, f = r / n, f / n
         x[0] = math.asinh(r / p.scale_R)
         P[0] = (m.R[2] + 2.0 * f * m.R[3] + f * f * m.R[4]) / (p.scale_R**2 + r * r)
-    more = 0
     for i in range(2):
         g = m.sides[i]
         n, e, e2, h, within = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -125,8 +124,7 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
             P[1 + i] = (g[2] + 2.0 * h * g[3] + h * h * g[4] + noise) / (p.scale_D**2 + max(e * e - 4.0 * noise, 0.0))
             x[3 + i] = math.log(max(e2 / n - e * e, 0.0) + within / n + _LEAST) - g[5]
             P[3 + i] = g[6]
-    if P[1] >= _UNKNOWN or (P[2] < _UNKNOWN and abs(x[2]) > abs(x[1])):
-        more = 1
+    more = 1 if P[1] >= _UNKNOWN or (P[2] < _UNKNOWN and abs(x[2]) > abs(x[1])) else 0
     return traction / max(steps, 1.0), more
 
 
@@ -246,7 +244,7 @@ def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
             m.evidence[law, i] *= keep
             if heard:
                 at = law * _NN + n
-                below, above = p.weight * nodes[at], p.weight * nodes[at + 1]
+                below, above = p.weight * (nodes[at] + t.ways[law, n]), p.weight * (nodes[at + 1] + t.ways[law, n + 1])
                 m.evidence[law, i] = m.evidence[law, i] + (1.0 - a) * below + a * above
 
 

@@ -99,15 +99,16 @@ class Inputs(NamedTuple):
 
 class Emissions(NamedTuple):
     """Mean by covariates (laws, nodes, features, covariates) and covariance (laws, nodes, features, features) at each
-    distance, by laws of lost contact with shares `law` (laws,).
+    distance, by laws of lost contact with shares `law` (laws,): each of front wheels that slip ahead, then of others.
 
-    `contact` (laws, nodes) [-] of the front axle; `prior` (full speeds,). `kind_` the same of kinds of road. `road`: 0
-    dry, 1 wet, 2 snow, ice or gravel; the shares of each sum to 1.
+    `contact` (laws, nodes) [-] of the front axle; `ways` (laws, nodes) log share of those wheels; `prior` (full
+    speeds,). `kind_` the same of kinds of road: `road` 0 dry, 1 wet, 2 snow, ice or gravel, whose shares sum to 1.
     """
 
     mean: FloatArray
     scatter: FloatArray
     contact: FloatArray
+    ways: FloatArray
     law: FloatArray
     prior: FloatArray
     kind_mean: FloatArray

@@ -12,7 +12,7 @@ import numpy as np
 
 from aqualog.core.vehicle import KEYS, Vehicle
 
-from .tyre import tmeasy
+from .tyre import LAW, tmeasy
 
 __all__ = [
     "ARCHETYPES", "FILE_ERRORS", "NO_ODD", "SPREAD", "Car", "Odd", "draw_car", "of_the_day", "settle", "vehicle_file",
@@ -92,6 +92,7 @@ class Car(NamedTuple):
     water_gain: np.ndarray
     contact_gain: np.ndarray
     track_film: float
+    law: np.ndarray = LAW  # of water
 
 
 class Odd(NamedTuple):

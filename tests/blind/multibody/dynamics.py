@@ -116,7 +116,7 @@ def _driveline(y, f, aux, drive, gear, p):
 @compiled
 def _slope(i, t, y, aux, leak, lost, p, odd):
     slope = p.slope[i] * load_factor(aux[LOAD + i], p.load_ref[i], p.load_law[i])
-    slope *= exp(p.slope_drift[i] * t) * (1.0 + p.leak_slope[i] * leak) * (1.0 - lost) ** 2
+    slope *= exp(p.slope_drift[i] * t) * (1.0 + p.leak_slope[i] * leak) * (1.0 - lost) ** p.law[9]
     if odd.saddle[0] != 0.0:
         slope *= 1.0 - odd.saddle[0] * _bell(abs(aux[T_SHAFT + i]), odd.saddle[1], odd.saddle[2])
     if odd.turning[0] != 0.0 and i > 1:
@@ -155,8 +155,8 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
             film = p.track_film + 0.05 * (film - p.track_film)
         lost, push, mu = 0.0, 0.0, p.mu[i]
         if film > 2e-5:
-            lost = min(lost_share(u, film, F_z, 4000.0) * p.contact_gain[i], 1.0)
-            push = water_push(u, film) * p.water_gain[i]
+            lost = min(lost_share(u, film, F_z, 4000.0, p.law) * p.contact_gain[i], 1.0)
+            push = water_push(u, film, p.law) * p.water_gain[i]
             mu *= 0.78 * (1.0 - lost)
         rolls = y[BELT + i] * r_e
         slope = _slope(i, t, y, aux, leak, lost, p, odd)

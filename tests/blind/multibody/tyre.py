@@ -7,14 +7,19 @@ from __future__ import annotations
 
 from math import sqrt
 
+import numpy as np
+
 from aqualog.core.compiled import compiled
 
-__all__ = ["load_factor", "lost_share", "tmeasy", "water_push"]
+__all__ = ["LAW", "load_factor", "lost_share", "tmeasy", "water_push"]
 
 PEAK_X, PEAK_Y = 0.09, 0.16  # slip and slip angle [rad] of the peak
 SLIDE = 4.5  # slip of full sliding over that of the peak
 SLIDE_SHARE = 0.83  # force then, over the peak's
-AQUA_V, AQUA_H = 33.0, 1.2e-3  # [m/s, m] full aquaplaning of an even film
+AQUA_H = 1.2e-3  # [m] of an even film
+# full aquaplaning [m/s] in it, exponents of film and load; begin and width of the step over v / full and its power (0:
+# smooth); drag [N] at 2 mm and 25 m/s (0: momentum), its exponents of film and speed; that of the slope over the contact
+LAW = np.array([33.0, 0.16, 0.25, 0.3, 0.72, 0.0, 0.0, 1.0, 2.0, 2.0])
 
 
 @compiled
@@ -53,17 +58,20 @@ def load_factor(F_z, F_ref, law):
 
 
 @compiled
-def lost_share(v, film, F_z, F_ref):
-    """Share of the contact that a film [m] lifts, 0 to 1."""
+def lost_share(v, film, F_z, F_ref, law):
+    """Share of the contact that a film [m] lifts, 0 to 1; `law` as `LAW`."""
     if film < 2e-5:
         return 0.0
-    full = AQUA_V * (AQUA_H / film) ** 0.16 * (max(F_z, 200.0) / F_ref) ** 0.25
-    x = (v / full - 0.3) / 0.72
+    full = law[0] * (AQUA_H / film) ** law[1] * (max(F_z, 200.0) / F_ref) ** law[2]
+    x = (v / full - law[3]) / law[4]
     x = min(max(x, 0.0), 1.0)
-    return x * x * x * (10.0 - 15.0 * x + 6.0 * x * x) * min(film / 1.5e-4, 1.0)
+    lost = x ** law[5] if law[5] > 0.0 else x * x * x * (10.0 - 15.0 * x + 6.0 * x * x)
+    return lost * min(film / 1.5e-4, 1.0)
 
 
 @compiled
-def water_push(v, film):
+def water_push(v, film, law):
     """Drag of a film on one wheel [N]: momentum of what 0.19 m of tread push aside, a part of it thrown."""
+    if law[6] > 0.0:
+        return law[6] * (film / 2e-3) ** law[7] * (v / 25.0) ** law[8]
     return 1000.0 * 0.19 * film * v * v * (0.36 + 0.2 * film / (film + 1e-3))
