@@ -139,8 +139,8 @@ def _test(s: Mapping[str, Any] | None) -> list[str]:
     p, surrogates = s["p_value"], s["surrogates"]
     beyond = s["statistic"] is not None and s["threshold"] is not None and s["statistic"] > s["threshold"]
     said = [
-        f"{'More' if beyond else 'No more'} than noise: largest test value {short(s['statistic'])}, "
-        f"threshold {short(s['threshold'])}, p {'≈' if p == 0.0 else '='} {short(p)}."
+        f"Known effects explain {'more' if beyond else 'no more'} than noise: largest test value "
+        f"{short(s['statistic'])}, threshold {short(s['threshold'])}, p {'≈' if p == 0.0 else '='} {short(p)}."
     ]
     asked = f"False alarm level {short(s['level'])}"
     if s["achieved_level"] is None:
