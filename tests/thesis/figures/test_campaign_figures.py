@@ -396,6 +396,8 @@ def test_slips_of_the_free_wheels_are_those_of_3_13():
 )  # fmt: skip
 def test_c54_new_winter_tyres_do_not_fall_and_worn_ones_do(monkeypatch, worn, deep, verdict):
     found = SimpleNamespace(levels=(), wheels=("rl",), selected=SimpleNamespace(wish=None), of=lambda level, _: level)
-    monkeypatch.setattr(slip_slopes, "pairs", lambda *_: [("2 mm", Effect(worn, worn - 7.0, worn + 5.0, 9), Effect(*deep, 9))])
+    monkeypatch.setattr(
+        slip_slopes, "pairs", lambda *_: [("2 mm", Effect(worn, worn - 7.0, worn + 5.0, 9), Effect(*deep, 9))]
+    )
     monkeypatch.setattr(slip_slopes, "fall", lambda level: level)
     assert slip_slopes._c54(found).verdict == verdict
