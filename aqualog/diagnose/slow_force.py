@@ -74,7 +74,7 @@ def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None
 
 
 def _wander(drive: Drive, left: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Middles of windows [s], and what force balance and wheels against torque show alike there [m/s^2]. Each (k,)
+    """Middles of windows [s], and what force balance and wheels against torque show alike there [m/s²]. Each (k,)
 
     Means over windows of 10 s, 0 where the two disagree. For the test without their mean and what goes with speed and
     torque, then as they are.
