@@ -143,6 +143,9 @@ def test_effect_below_the_stated_limit_is_no_miss():
     above = judged(document("no_effect", detection_limits={"payload_mass": "80 kg"}), truth("known", MASS))
     unsaid = judged(document("no_effect"), truth("known", MASS))
     assert [c.limit_is_right for c in (below, above, unsaid)] == [True, False, False]
+    loss = truth("known", ("pressure_loss", "rl", "duration", 60.0))
+    loss["effects"][0]["parameters"]["radius"] = 0.003  # which the limit is for
+    assert judged(document("no_effect", detection_limits={"pressure_loss@rl": "0.006"}), loss).limit_is_right
     got = measured([below, above, unsaid])
     assert got["right name first, z >= 8"] == (2, 0.0)
     assert got["no effect, below the stated limit (no miss)"] == (3, pytest.approx(1 / 3))

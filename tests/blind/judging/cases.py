@@ -12,7 +12,7 @@ from tests.blind.judging.answers import Answer, Form, coordinates_of, exact_twin
 from tests.blind.metrics.measure import right_first, right_or_listed
 from tests.blind.metrics.rows import Fact, Row, Said
 
-__all__ = ["Judged", "beyond", "facts_of", "fits", "judge"]
+__all__ = ["Judged", "beyond", "facts_of", "fits", "judge", "limited"]
 
 LAGS = ("signal_delay", "clock_skew")
 
@@ -68,9 +68,7 @@ class Judged:
         row = self.row
         if row.verdict != "no_effect" or len(row.truth) != 1 or row.truth[0].key not in row.limits:
             return False
-        fact = row.truth[0]
-        name, x = next(iter(fact.values.items()), ("", 0.0))
-        return abs(x - _neutral(fact.effect, name)) <= row.limits[fact.key]
+        return limited(row.truth[0]) <= row.limits[row.truth[0].key]
 
     @property
     def _named(self) -> tuple[Said, ...]:
@@ -162,6 +160,13 @@ def _is_same_lag(cause: Said, old: Said) -> bool:
 
 def _alike(a: Form, b: Form) -> bool:
     return a.depends_on == b.depends_on and bool(set(a.mechanisms) & set(b.mechanisms))
+
+
+def limited(fact: Fact) -> float:
+    """Deviation of the parameter that the limit of an effect is stated for: its first one."""
+    names = [p.name for p in EFFECTS[fact.effect].parameters] if fact.effect in EFFECTS else []
+    name = next((n for n in names if n in fact.values), next(iter(fact.values), ""))
+    return abs(fact.values.get(name, 0.0) - _neutral(fact.effect, name))
 
 
 def _neutral(effect: str, name: str) -> float:

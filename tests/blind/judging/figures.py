@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from tests.blind.judging.cases import Judged
+from tests.blind.judging.cases import Judged, limited
 from tests.blind.metrics import naming, worth
 from tests.blind.metrics.intervals import clopper_pearson
 from tests.blind.metrics.measure import Measure, by, quantity, share
@@ -123,12 +123,7 @@ def weak(cases: Sequence[Judged]) -> list[Measure]:
 
 def _below(c: Judged) -> bool:
     """A limit that is not stated is one that nothing reaches."""
-    fact = c.row.truth[0]
-    if not fact.values:
-        return True
-    name, x = next(iter(fact.values.items()))
-    neutral = 1.0 if name in ("gain", "scale", "depth_gain") else 0.0
-    return abs(x - neutral) <= c.row.limits.get(fact.key, math.inf)
+    return limited(c.row.truth[0]) <= c.row.limits.get(c.row.truth[0].key, math.inf)
 
 
 def coverage(cases: Sequence[Judged]) -> list[Measure]:
