@@ -29,6 +29,7 @@ __all__ = ["slow_force"]
 
 WINDOW_S, LEAST_USED, LEAST_WINDOWS = 10.0, 0.3, 12  # of a mean; share of it that is used; windows of a drive
 USUAL = 0.012  # [m/s^2] sd by which forces wander: of measured trips of one car the largest has 0.012, most 0.005 (S)
+MOST_ALIKE = 0.95  # correlation of neighbouring windows, at most: 39 of them count as one then (K)
 OVER = ("v_x", "torque")  # coordinates whose functions compete already
 
 
@@ -45,18 +46,20 @@ def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None
     if s.size < LEAST_WINDOWS or near.sum() < LEAST_WINDOWS // 2:
         return None
     slow = float(np.mean((s[1:] * s[:-1])[near]))  # noise of a window is in no other one
-    rho = slow / float(np.mean(s**2))
-    if slow <= USUAL**2 or rho >= 1.0:
+    if slow <= USUAL**2:
         return None
+    rho = min(slow / float(np.mean(s**2)), MOST_ALIKE)
     kind = next(m for m in MECHANISMS if m.name == "force")
     as_force = kind.usual / drive.vehicle.mass
     each = math.log(USUAL / as_force) + 0.5 * slow * (USUAL**-2 - as_force**-2)
     nats = s.size * (1.0 - rho) / (1.0 + rho) * each + math.log(SHAPE_PRIOR)
-    chance = 1.0 / (1.0 + math.exp(-min(nats, 700.0)))
+    if nats < math.log(SURE / (1.0 - SURE)):
+        return None
+    chance = 1.0 / (1.0 + math.exp(-nats))
     y, at = left[drive.channels.index("force_balance")], np.arange(left.shape[1]) * block_step(drive.dt)
     used = y[drive.mask]
     share = 1.0 - float(np.var(used - np.interp(at, t, whole)[drive.mask]) / max(np.var(used), 1e-30))
-    if chance < SURE or share <= WORTH_TELLING:
+    if share <= WORTH_TELLING:
         return None
     try:
         by_newton = float(np.mean(unit_force(drive, model, left)[0][drive.mask]))

@@ -56,6 +56,14 @@ def test_what_goes_with_the_speed_is_left_to_the_competition(drive):
     assert slow_force(drive, noise() + np.array([WAVE, 0.0 * T]), Model()) is None
 
 
+def test_of_hours_only_noise_is_left(drive):
+    """Evidence far below that of noise, and windows that are all alike, are no error."""
+    n = 200_000
+    drive.mask, drive.coordinates = np.ones(n, dtype=bool), {}
+    assert slow_force(drive, np.outer([1.0, 0.0], 0.02 * np.sign(np.sin(np.arange(n) / 100.0))), Model()) is None
+    assert slow_force(drive, np.zeros((2, n)), Model()) is None
+
+
 def test_without_accelerometer_a_slope_would_be_a_force(drive):
     drive.channels = ("force_balance", "axle_slip")
     assert slow_force(drive, noise() + np.array([WAVE, 0.0 * T]), Model()) is None
