@@ -67,7 +67,7 @@ def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None
         return None
     f = whole / by_newton
     # second differences of a slow function are those of its noise, with six times its variance
-    noise = math.sqrt(float(np.mean(np.diff(s, 2) ** 2)) / 6.0) / abs(by_newton)
+    noise = math.sqrt(float(np.mean(np.diff(whole, 2) ** 2)) / 6.0) / abs(by_newton)
     half = NormalDist().inv_cdf(1.0 - 0.025 / s.size) * noise
     found = Remainder(
         "force_balance", ("t",), share, math.nan, t[:, None], f, f - half, f + half, (), None, 0.0, "",
