@@ -41,12 +41,13 @@ def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None
     """
     if not {"force_balance", "kinematic"} <= set(drive.channels):
         return None
-    t, s, whole = _wander(drive, left)
+    t, s, whole, apart = _wander(drive, left)
     near = np.diff(t) < 1.5 * WINDOW_S
     if s.size < LEAST_WINDOWS or near.sum() < LEAST_WINDOWS // 2:
         return None
     slow = float(np.mean((s[1:] * s[:-1])[near]))  # noise of a window is in no other one
-    if slow <= USUAL**2:
+    # a wandering accelerometer and a road agree by chance now and then, but mostly they differ
+    if slow <= USUAL**2 or apart > float(np.mean(s**2)):
         return None
     rho = min(slow / float(np.mean(s**2)), MOST_ALIKE)
     kind = next(m for m in MECHANISMS if m.name == "force")
@@ -76,11 +77,11 @@ def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None
     return replace(found, sentence=describe(kind, found))
 
 
-def _wander(drive: Drive, left: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Middles of windows [s], and what force balance and wheels against torque show alike there [m/s²]. Each (k,)
+def _wander(drive: Drive, left: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+    """Middles of windows [s], what force balance and wheels against torque show alike there [m/s²], each (k,), and the
+    mean square of their difference [m²/s⁴].
 
-    Means over windows of 10 s, 0 where the two disagree. For the test without their mean and what goes with speed and
-    torque, then as they are.
+    Means over windows of 10 s, 0 where the two disagree. For the test without what goes with speed and torque.
     """
     step = block_step(drive.dt)
     number = (np.arange(left.shape[1]) * step // WINDOW_S).astype(np.intp)
@@ -99,7 +100,10 @@ def _wander(drive: Drive, left: FloatArray) -> tuple[FloatArray, FloatArray, Flo
         return np.asarray(x - A @ np.linalg.lstsq(A, x, rcond=None)[0])
 
     wheels = force - kinematic
-    return np.asarray((full + 0.5) * WINDOW_S), _alike(own(force), own(wheels)), _alike(force, wheels)
+    means = [np.full(full.size, x.mean() if full.size else 0.0) for x in (force, wheels)]
+    whole = _alike(force - means[0], wheels - means[1]) + _alike(*means)
+    apart = float(np.mean(own(kinematic) ** 2)) if full.size else 0.0
+    return np.asarray((full + 0.5) * WINDOW_S), _alike(own(force), own(wheels)), whole, apart
 
 
 def _alike(a: FloatArray, b: FloatArray) -> FloatArray:

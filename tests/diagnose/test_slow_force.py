@@ -28,9 +28,10 @@ def noise(size=0.04):
     return size * np.random.default_rng(5).standard_normal((2, T.size))
 
 
-def test_a_slow_force_is_found_with_its_size(drive):
-    found = slow_force(drive, noise() + np.array([WAVE - 0.03, 0.0 * T]), Model())
-    true = -MASS * (np.interp(found.x[:, 0], T, WAVE) - 0.03)  # against the motion
+@pytest.mark.parametrize(("offset", "level"), [(0.0, -0.03), (0.1, 0.0)])
+def test_a_slow_force_is_found_with_its_size(drive, offset, level):
+    found = slow_force(drive, noise() + np.array([WAVE + level + offset, 0.0 * T + offset]), Model())
+    true = -MASS * (np.interp(found.x[:, 0], T, WAVE) + level)  # against the motion
     assert (found.mechanism, found.depends_on, found.unit) == ("force", ("t",), "N")
     assert found.f == pytest.approx(true, abs=25.0)
     assert np.mean((found.low <= true) & (true <= found.high)) > 0.9
@@ -43,6 +44,7 @@ def test_a_slow_force_is_found_with_its_size(drive):
     [
         pytest.param([WAVE, WAVE], id="accelerometer"),
         pytest.param([0.0 * T, WAVE], id="slope"),
+        pytest.param([2.0 * WAVE, 2.0 * WAVE + 0.16 * np.sin(2.0 * np.pi * T / 110.0)], id="accelerometer and slope"),
         pytest.param([0.15 * WAVE, 0.0 * T], id="usual wander"),
         pytest.param([0.08 * np.sign(np.sin(2.0 * np.pi * T / 20.0)), 0.0 * T], id="not slow"),
     ],
