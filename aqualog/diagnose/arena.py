@@ -66,10 +66,10 @@ class Field:
     shapes: tuple[Shape, ...]
 
     def name(self, block: int) -> str:
-        """Name by which probabilities add up: the effect, or the mechanism of a shape with `()`."""
+        """Name by which probabilities add up: that of the hypothesis, or the mechanism of a shape with `()`."""
         b = self.blocks[block]
         if b.kind == "effect":
-            return self.evidence.asked[b.tag].effect.name
+            return self.evidence.asked[b.tag].name
         return f"{self.shapes[b.tag].mechanism.name}()"
 
 

@@ -111,7 +111,8 @@ def _first(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
         i for i, b in enumerate(arena.blocks) if b.kind == "shape" and set(arena.shapes[b.tag].coordinates) & set(ALONG)
     ]
     apart = [i for i, b in enumerate(arena.blocks) if b.kind == "effect" and arena.evidence.asked[b.tag].drive]
-    return [best, *((*best, m) for m in first_of(arena.blocks, inner, arena.name, best, along, apart))]
+    firsts = first_of(arena.blocks, inner, lambda i: arena.name(i).split("@")[0], best, along, apart)
+    return [best, *((*best, m) for m in firsts)]
 
 
 def begin(arena: Arena) -> Begun:

@@ -13,6 +13,7 @@ from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import channel_values
 from aqualog.diagnose.drive import Drive, led_by, stretches
+from aqualog.diagnose.records import name_by_place
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.tolerances import LANE_TOLERANCES, STAND_IN, TOLERANCES
 from aqualog.model.effects import EFFECTS
@@ -67,6 +68,11 @@ class Hypothesis:
     def key(self) -> str:
         """`tyre_radius@fl`."""
         return self.effect.name if self.where is None else f"{self.effect.name}@{self.where}"
+
+    @property
+    def name(self) -> str:
+        """By which probabilities add up, like that of a cause."""
+        return name_by_place(self.effect.name, self.where)
 
     @property
     def parts(self) -> tuple[str, ...]:

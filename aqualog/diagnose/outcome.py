@@ -39,7 +39,7 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
     if found.forms:
         linear = _linear(found, found.posterior.best, model)
         share = {n: tempered(p) for n, p in found.posterior.marginal.items()}
-        causes = (replace(c, probability=share.get(c.effect, 0.0)) for c, large in linear if large)
+        causes = (replace(c, probability=share.get(c.name, 0.0)) for c, large in linear if large)
         beside = tuple(c for c in causes if c.probability >= SURE)
         return Outcome("unexplained", beside, certain=frozenset(c.effect for c in beside))
 

@@ -56,8 +56,14 @@ class Cause:
 
     @property
     def name(self) -> str:
-        """By which probabilities add up: wheels are places of one cause, each signal has a cause of its own."""
-        return self.effect if self.where in (*WHEELS, *AXLES, *SIDES) else self.key
+        """By which probabilities add up, see `name_by_place`."""
+        return name_by_place(self.effect, self.where)
+
+
+def name_by_place(effect: str, where: str | None) -> str:
+    """`tyre_radius` at any wheel, axle or side, which are places of one cause; `signal_delay@a_x`: each signal has its
+    own."""
+    return effect if where in (None, *WHEELS, *AXLES, *SIDES) else f"{effect}@{where}"
 
 
 @dataclass(frozen=True, slots=True)

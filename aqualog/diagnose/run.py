@@ -296,7 +296,7 @@ def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
         outcome = outcome._replace(causes=tuple(c for c in outcome.causes if (c.effect, c.drives) != mean))
     is_sure = outcome.verdict != "cannot_tell" or "accelerometer_bias" in outcome.certain
     # an offset of the accelerometer has the constant that a mean would repeat
-    if is_sure and any(c.effect == "accelerometer_bias" for c in outcome.causes):
+    if is_sure and any(c.key == "accelerometer_bias@a_x" for c in outcome.causes):
         cause = replace(cause, parameters={n: e for n, e in cause.parameters.items() if n != "grade_mean"})
     return outcome.beside(cause)
 

@@ -64,7 +64,7 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
 
 
 def silent(refit: Refit, arena: Arena, noises: Sequence[Noise]) -> frozenset[str]:
-    """Effects of a refitted set that are worth naming but do not make the measurement likelier, each beside the others.
+    """Names in a refitted set that are worth naming but do not make the measurement likelier, each beside the others.
 
     One that needs wheel speeds must do so in their channels: a simulator's error in fast movements is in others.
     """
@@ -79,7 +79,7 @@ def silent(refit: Refit, arena: Arena, noises: Sequence[Noise]) -> frozenset[str
         shown = gain[wheels].sum() >= BY_WHEELS * np.maximum(gain, 0.0).sum()
         large = any(abs(x) >= h.worth_naming(n) for x, n in zip(off.tolist(), h.free, strict=True))
         if large and (gain.sum() <= 0.0 or ("wheel speeds" in h.effect.drive.needs and not shown)):
-            out.add(h.effect.name)
+            out.add(h.name)
     return frozenset(out)
 
 

@@ -30,7 +30,7 @@ __all__ = ["slow_force"]
 WINDOW_S, LEAST_USED, LEAST_WINDOWS = 10.0, 0.3, 12  # of a mean; share of it that is used; windows of a drive
 USUAL = 0.012  # [m/s^2] sd by which forces wander: of measured trips of one car the largest has 0.012, most 0.005 (S)
 MOST_ALIKE = 0.95  # correlation of neighbouring windows, at most: 39 of them count as one then (K)
-OVER = ("v_x", "torque")  # coordinates whose functions compete already
+OVER = ("v_x", "torque")  # of the coordinates whose functions compete already, those with which forces change most
 
 
 def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None:
@@ -39,8 +39,8 @@ def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None
     The evidence is that of a wander of a force's usual size against the usual wander, over windows that count as
     independent after their own correlation: n (1 - rho) / (1 + rho).
     """
-    if not {"force_balance", "kinematic"} <= set(drive.channels):
-        return None
+    if drive.course.lanes or not {"force_balance", "kinematic"} <= set(drive.channels):
+        return None  # on water no law of drag is exact
     t, s, whole, apart = _wander(drive, left)
     near = np.diff(t) < 1.5 * WINDOW_S
     if s.size < LEAST_WINDOWS or near.sum() < LEAST_WINDOWS // 2:
@@ -70,8 +70,11 @@ def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None
     # second differences of a slow function are those of its noise, with six times its variance
     noise = math.sqrt(float(np.mean(np.diff(whole, 2) ** 2)) / 6.0) / abs(by_newton)
     half = NormalDist().inv_cdf(1.0 - 0.025 / s.size) * noise
+    every = np.arange(t[0], t[-1] + 0.5 * WINDOW_S, WINDOW_S)
+    drawn = np.full(every.size, np.nan)  # where the drive was not usable
+    drawn[np.rint((t - t[0]) / WINDOW_S).astype(np.intp)] = f
     found = Remainder(
-        "force_balance", ("t",), share, math.nan, t[:, None], f, f - half, f + half, (), None, 0.0, "",
+        "force_balance", ("t",), share, math.nan, every[:, None], drawn, drawn - half, drawn + half, (), None, 0.0, "",
         kind.name, kind.unit, tempered(chance),
     )  # fmt: skip
     return replace(found, sentence=describe(kind, found))

@@ -159,6 +159,15 @@ def test_nothing_to_decide_is_no_manoeuvre(wind):
     assert next_manoeuvre(evidence, [rivals[0], rivals[0]], noises, Model()) is None
 
 
+def test_the_same_fault_of_two_signals_is_worth_a_run():
+    evidence, rivals, noises = case(
+        [log(model("signal_delay", "a_x", delay=0.2))], [["signal_delay@a_x"], ["signal_delay@v_x"]]
+    )
+    answer = next_manoeuvre(evidence, rivals, noises, Model())
+    assert answer.before == pytest.approx(max(c.probability for c in rivals), abs=1e-6)
+    assert answer.after >= answer.before
+
+
 def test_runs_are_safe(wind):
     _, drive, _ = wind
     wet = replace(drive, course=replace(drive.course, lanes=(Lane(5.0, 10.0, depth_left=1e-3, depth_right=1e-3),)))

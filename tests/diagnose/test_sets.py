@@ -5,9 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from aqualog.diagnose.arena import Field
 from aqualog.diagnose.competition import Block
+from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.sets import evidence_of, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.unexplained import clear_forms
+from aqualog.model.effects import EFFECTS
 
 RNG = np.random.default_rng(5)
 X = RNG.standard_normal((400, 6))
@@ -77,3 +80,11 @@ def test_a_form_is_clear_where_no_effect_explains_it():
     assert shaped == [(4,)]
     assert evidence_of(BLOCKS, G, sets.best) > evidence_of(BLOCKS, G, (1,)) + 5.0
     assert forms(X @ [0.0, 1.0, 0.0, 0.0, 0.0, 0.0])[0] == []
+
+
+def test_probabilities_add_up_over_wheels_and_not_over_signals():
+    places = [("signal_delay", "a_x"), ("signal_delay", "v_x"), ("slip_stiffness", "fl"), ("slip_stiffness", "r")]
+    asked = tuple(Hypothesis(EFFECTS[e], w, ()) for e, w in places)
+    blocks = tuple(Block(h.key, "effect", (i,), np.eye(1), 0.0, i) for i, h in enumerate(asked))
+    found = ranked({(i,): 0.0 for i in range(4)}, Field(SimpleNamespace(asked=asked), blocks, np.ones(4), ()).name)
+    assert found.marginal == pytest.approx({"signal_delay@a_x": 0.25, "signal_delay@v_x": 0.25, "slip_stiffness": 0.5})

@@ -19,7 +19,7 @@ def drive(monkeypatch):
     monkeypatch.setattr(module, "unit_force", lambda drive, _model, left: np.full(left.shape, -1.0 / MASS))
     rng = np.random.default_rng(4)
     return SimpleNamespace(
-        channels=("force_balance", "kinematic"), dt=0.01, mask=rng.random(T.size) > 0.2, vehicle=SimpleNamespace(mass=MASS),
+        course=SimpleNamespace(lanes=()), channels=("force_balance", "kinematic"), dt=0.01, mask=rng.random(T.size) > 0.2, vehicle=SimpleNamespace(mass=MASS),
         coordinates={"v_x": rng.uniform(10.0, 30.0, T.size), "torque": rng.uniform(-200.0, 600.0, T.size)},
     )  # fmt: skip
 
@@ -51,6 +51,14 @@ def test_a_slow_force_is_found_with_its_size(drive, offset, level):
 )
 def test_what_no_force_does_or_any_drive_does_is_no_finding(drive, slow):
     assert slow_force(drive, noise() + slow, Model()) is None
+
+
+def test_where_the_drive_cannot_be_used_nothing_is_drawn(drive):
+    drive.mask[1000:1400] = False
+    found = slow_force(drive, noise() + np.array([WAVE, 0.0 * T]), Model())
+    assert np.isnan(found.f).tolist() == [100.0 < x < 140.0 for x in found.x[:, 0].tolist()]
+    drive.course = SimpleNamespace(lanes=(1,))
+    assert slow_force(drive, noise() + np.array([WAVE, 0.0 * T]), Model()) is None
 
 
 def test_what_goes_with_the_speed_is_left_to_the_competition(drive):

@@ -100,7 +100,7 @@ DIAGNOSE = Document(
             )),
         )),
         rows("unexplained", "what no effect of the library explains", (
-            text("channel", "residual"),
+            text("channel", "residual, or `axle_slip`, `side_slip_f`, `side_slip_r`: differences of wheels' slip"),
             text("mechanism", "what it acts through: force, accelerometer, torque, slip_f, ...; null of a campaign",
                  null=True),
             text("unit", "unit of the function; empty: that of the channel"),
