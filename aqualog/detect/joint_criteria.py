@@ -181,7 +181,7 @@ class JointCriteriaWatch:
         A light braking that may be in no torque shuts the gate as well.
         """
         f, stopped = scene.f, np.zeros(scene.size, dtype=bool)
-        light = scene.braking.get(UNLOGGED, stopped)
+        light = scene.braking.get(UNLOGGED, np.zeros_like(stopped))
         for w in scene.wheels:
             if f"mu_{w}" not in f:
                 continue
