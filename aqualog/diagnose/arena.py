@@ -70,7 +70,8 @@ class Field:
         b = self.blocks[block]
         if b.kind == "effect":
             return self.evidence.asked[b.tag].name
-        return f"{self.shapes[b.tag].mechanism.name}()"
+        m = self.shapes[b.tag].mechanism
+        return f"{m.family or m.name}()"
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +191,10 @@ def arena_of(evidence: Evidence, forces: Sequence[FloatArray]) -> Arena:
     names = [n for n in coordinates[0] if all(n in c for c in coordinates) and (len(parts) == 1 or n not in ALONG)]
     joint = {n: np.concatenate([c[n] for c in coordinates]) for n in names}
     mask = np.concatenate([p.mask for p in parts])
-    made = shapes(joint, mask, block_step(evidence.drives[chosen[0][0]].dt), list(parts[0].responses))
+    # where one axle has nearly all of the torque, its slip is that of all wheels
+    only = evidence.drives[0].vehicle.drivetrain != "awd"
+    has = [source for source in parts[0].responses if not (only and source == "slip_stiffness")]
+    made = shapes(joint, mask, block_step(evidence.drives[chosen[0][0]].dt), has)
     ends = np.cumsum([0, *(p.mask.size for p in parts)])
     rows = tuple(slice(a, b) for a, b in pairwise(ends.tolist()))
     blocks, sd = blocks_of(evidence, made)
@@ -283,9 +287,10 @@ def _tolerance(evidence: Evidence, made: Sequence[Shape], blocks: Sequence[Block
         if b.kind != "shape":
             continue
         s = made[b.tag]
-        if len(s.coordinates) == 1 and s.coordinates[0] in TOLERATED and s.mechanism.allowed > 0.0:
+        m = s.mechanism
+        if len(s.coordinates) == 1 and s.coordinates[0] in TOLERATED and m.allowed > 0.0 and not m.is_whole:
             c = list(b.columns)
-            out[np.ix_(c, c)] = (s.mechanism.allowed / s.mechanism.usual) ** 2 * s.basis.prior
+            out[np.ix_(c, c)] = (m.allowed / m.usual) ** 2 * s.basis.prior
     return out
 
 

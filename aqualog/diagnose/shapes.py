@@ -19,7 +19,7 @@ __all__ = ["ALONG", "MECHANISMS", "Mechanism", "Shape", "shapes"]
 @dataclass(frozen=True, slots=True)
 class Mechanism:
     """`source`: effect and place whose signature is the response, in `unit`; `usual` size of a deviation, and
-    the one by which a car and its simulation differ anyway.
+    the one by which a car and its simulation differ anyway. `family`: its probability is that of all of these together.
 
     `over`: coordinates of its functions, alone or in pairs; `scales`: the signal that it multiplies, on which what it
     does depends as well.
@@ -35,6 +35,12 @@ class Mechanism:
     is_road: bool = False  # every road has it: no unknown form
     is_fast: bool = False  # it multiplies a fast signal: over time and place a smooth function is more than slow noise
     scales: str = ""
+    family: str = ""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is of all axles at once, beside mechanisms of one axle each."""
+        return self.family == self.name
 
 
 ALONG = ("t", "position")
@@ -43,35 +49,41 @@ _CAR = (("v_x",), ("torque",), ("a_y",), ("yaw_rate",), ("steer_angle",), ("sinc
 _SENSOR = (("v_x",), ("a_x",), ("t",), ("ambient_temperature",))
 _SLIP = (("torque",), ("v_x",), ("t",), ("a_y",), ("yaw_rate",), ("since_braking",), ("water_depth",))
 MECHANISMS: tuple[Mechanism, ...] = (
-    Mechanism("force", "a force on the car", "unit_force", "N", 150.0, 15.0, _CAR),
+    Mechanism("force", "a force on the car", "unit_force", "N", 150.0, 7.5, _CAR),
     Mechanism(
-        "accelerometer", "an offset of the accelerometer", "accelerometer_bias@a_x", "m/s^2", 0.15, 0.01,
+        "accelerometer", "an offset of the accelerometer", "accelerometer_bias@a_x", "m/s^2", 0.15, 0.005,
         _SENSOR,
     ),
     Mechanism(
-        "accelerometer_gain", "the gain of the accelerometer", "accelerometer_gain@a_x", "-", 0.05, 0.01,
+        "accelerometer_gain", "the gain of the accelerometer", "accelerometer_gain@a_x", "-", 0.05, 0.005,
         _SENSOR, is_fast=True, scales="a_x",
     ),
     Mechanism(
-        "torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.01,
+        "torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.005,
         (("torque",), ("v_x",), ("t",)), is_fast=True,
     ),
-    Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.07, _SLIP, is_fast=True),
-    Mechanism("slip_r", "the slip slope of the rear axle", "slip_stiffness@r", "-", 0.3, 0.07, _SLIP, is_fast=True),
+    Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.035, _SLIP, is_fast=True,
+              family="slip"),
+    Mechanism("slip_r", "the slip slope of the rear axle", "slip_stiffness@r", "-", 0.3, 0.035, _SLIP, is_fast=True,
+              family="slip"),
     Mechanism(
-        "radius_f", "the radius of the front wheels", "tyre_radius@f", "-", 0.005, 0.0007,
+        "slip", "the slip slope of all wheels", "slip_stiffness", "-", 0.3, 0.035,
+        (("torque",), ("v_x",), ("a_y",), ("yaw_rate",), ("since_braking",)), family="slip",
+    ),
+    Mechanism(
+        "radius_f", "the radius of the front wheels", "tyre_radius@f", "-", 0.005, 0.00035,
         (("v_x",), ("t",), ("torque",)),
     ),
     Mechanism(
-        "radius_r", "the radius of the rear wheels", "tyre_radius@r", "-", 0.005, 0.0007,
+        "radius_r", "the radius of the rear wheels", "tyre_radius@r", "-", 0.005, 0.00035,
         (("v_x",), ("t",), ("torque",)),
     ),
     Mechanism(
-        "velocity", "the scale of the reference velocity", "velocity_scale@v_x", "-", 0.01, 0.001,
+        "velocity", "the scale of the reference velocity", "velocity_scale@v_x", "-", 0.01, 0.0005,
         (("v_x",), ("t",)),
     ),
     Mechanism(
-        "lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.1,
+        "lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.05,
         (("v_x",),),
     ),
     Mechanism(

@@ -384,7 +384,7 @@ _ALL = [
             leak_radius=_changed(p.leak_radius, w, np.add, v["radius"]),
             leak_slope=_changed(p.leak_slope, w, np.add, v["slope"]), leak_start=v["start"], leak_time=v["duration"])),
         _WHEEL_PLACES, twins=("tyre_radius",),
-        drive=DriveSearch((_SPEEDS,), by_wheel=True, variants=_leaks, begins_like="tyre_radius", tolerance=1e-3),
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, variants=_leaks, begins_like="tyre_radius"),
         belongs="moment",
     ),
     Effect(

@@ -92,7 +92,7 @@ def test_a_kerb_is_no_form():
 
 
 def test_a_known_effect_beside_an_interval():
-    _, p, forms = found(17, lambda c: 200.0 * trapezoid(c["t"], 60.0, 120.0, 0.1), aero_drag=0.5)
+    _, p, forms = found(17, lambda c: 200.0 * trapezoid(c["t"], 60.0, 120.0, 0.1), aero_drag=0.3)
     assert [r.depends_on for r in forms] == [("t",)]
     assert p.marginal["aero_drag"] > 0.95
 

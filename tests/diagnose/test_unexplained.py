@@ -1,5 +1,6 @@
 """Unknown forms: found in a drive through the competition, described as functions, taken into a model as terms."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -248,6 +249,29 @@ def test_what_the_wheels_do_shows_in_their_slip(mechanism, channel):
     is_large, share, where = unexplained._where(field, [0], [0], Fitted([0], np.ones(1), np.eye(1)))
     assert where == channel
     assert (is_large, share > 0.9) == ((True, True) if channel == "kinematic" else (False, False))
+
+
+@pytest.mark.parametrize("drivetrain", ["awd", "rwd"])
+def test_a_slip_of_all_wheels_is_one_form(drivetrain):
+    """With a form of each axle, each has half of what it says and pays in full. One driven axle has all of it."""
+    rng = np.random.default_rng(9)
+    torque = 200.0 + 150.0 * slow(rng.standard_normal(N), 0.98)
+    mask, wheels = np.ones(N, dtype=bool), ("slip_fl", "slip_fr", "slip_rl", "slip_rr")
+    axle = {"f": np.array([1.0, 1.0, 0.0, 0.0]), "r": np.array([0.0, 0.0, 1.0, 1.0])}
+    made = {k: a[:, None] * 2e-4 * torque for k, a in (axle | {None: axle["f"] + axle["r"]}).items()}
+    velocity = 0.02 * slow(rng.standard_normal(N), 0.5)
+    y = velocity + 0.006 * rng.standard_normal((4, N)) - 0.8 * np.exp(-(((torque - 250.0) / 40.0) ** 2)) * made[None]
+    drive = SimpleNamespace(
+        mask=mask, channels=wheels, vehicle=replace(KNOWN_CAR, drivetrain=drivetrain), dt=DT, used_s=0.1 * N,
+        coordinates={"torque": torque, "v_x": 20.0 + 0.0 * torque},
+    )  # fmt: skip
+    asked = tuple(hypothesis("slip_stiffness", w) for w in made)
+    a = arena_of(make_evidence([drive], asked, [y], [[x[None] for x in made.values()]], Model()), [])
+    assert ("slip" in {s.mechanism.name for s in a.shapes}) == (drivetrain == "awd")
+    assert {a.name(i) for i, b in enumerate(a.blocks) if b.kind == "shape"} == {"slip()"}
+    found = unknown_forms(a, compete(a), seed=1)
+    assert [(r.mechanism, r.depends_on) for r in found] == ([("slip", ("torque",))] if drivetrain == "awd" else [])
+    assert all("all wheels" in r.sentence for r in found)
 
 
 def test_between_axles_the_noise_of_the_velocity_cancels():
