@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -26,6 +26,7 @@ __all__ = ["Clear", "clear_forms", "described", "unknown_forms"]
 AHEAD = 3.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
 WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
+NEARLY_ALL = 0.995  # of a function's values, whose largest counts
 LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what is large, by the channel's unit
 NOTABLE = 0.05  # probability from which another coordinate is mentioned
 ALIKE = 0.2  # share of the best coordinate's probability from which the drive cannot distinguish another
@@ -45,26 +46,35 @@ class Clear(NamedTuple):
     loss: float
 
 
-def clear_forms(field: Field, found: Sets, inner: FloatArray) -> list[Clear]:
+def clear_forms(
+    field: Field, found: Sets, inner: FloatArray, shows: Callable[[tuple[int, ...]], bool] = lambda _: True
+) -> list[Clear]:
     """Mechanisms of the best set that no known effect replaces, what explains most first.
 
     A mechanism counts if its share of the posterior is 0.95, the best set is e^3 times as likely as every set of known
-    effects, and it explains a fifth of what the set explains.
+    effects, its blocks show in the drives, and it explains a fifth of what the set explains, without mechanisms that do
+    not show.
     """
     blocks, name, best = field.blocks, field.name, found.best
     known = max(e for members, e in found.sets if all(blocks[m].kind != "shape" for m in members))
     if found.sets[0][1] - known < AHEAD:
         return []
-    whole = evidence_of(blocks, inner, best)
+    # over two coordinates that go together, either could be left out; the mechanism could not
+    names = dict.fromkeys(name(m) for m in best if blocks[m].kind == "shape")
+    sure = [tuple(m for m in best if name(m) == n) for n in names if found.marginal[n] >= SURE]
+    clear = [own for own in sure if shows(own)]
+    hidden = {m for own in sure if own not in clear for m in own}
+
+    def evidence(without: Container[int]) -> float:
+        return evidence_of(blocks, inner, [m for m in best if m not in without])
+
+    whole, counted = evidence(()), evidence(hidden)
     out = []
-    shapes = [m for m in best if blocks[m].kind == "shape"]
-    for n in dict.fromkeys(name(m) for m in shapes):
-        own = tuple(m for m in shapes if name(m) == n)
-        # over two coordinates that go together, either could be left out; the mechanism could not
-        loss = whole - evidence_of(blocks, inner, [m for m in best if m not in own])
-        if found.marginal[n] >= SURE and loss >= PART * whole:
-            first = min(own, key=lambda m: evidence_of(blocks, inner, [o for o in best if o != m]))
-            out.append(Clear(own, first, tempered(found.marginal[n]), loss))
+    for own in clear:
+        loss = whole - evidence(own)
+        if loss >= PART * counted:
+            first = min(own, key=lambda m: evidence((m,)))
+            out.append(Clear(own, first, tempered(found.marginal[name(first)]), loss))
     return sorted(out, key=lambda c: -c.loss)
 
 
@@ -76,17 +86,18 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     simulation differ by anyway. And no effect of the library may stand for it: a load of a fifth of the car looks like
     a torque that goes with the torque.
     """
-    clear = clear_forms(arena, posterior, posterior.tolerant)
-    if not clear:
-        return ()
     fit = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
+
+    def where(own: tuple[int, ...]) -> tuple[bool, float, str]:
+        return _where(arena, own, posterior.best, fit)
+
     found = []
-    for c in clear:
-        is_large, share, channel = _where(arena, c.own, posterior.best, fit)
+    for c in clear_forms(arena, posterior, posterior.tolerant, lambda own: where(own)[1] > WORTH_TELLING):
+        is_large, share, channel = where(c.own)
         form = described(arena, posterior, posterior.gram, fit, c, channel, share, seed)
         usual = WORTH * arena.shapes[arena.blocks[c.first].tag].mechanism.allowed
         is_large |= not form.manner and bool(np.nan_to_num(np.maximum(form.low, -form.high)).max() >= usual)
-        if share > WORTH_TELLING and is_large and form.cosine <= SAME:
+        if is_large and form.cosine <= SAME:
             found.append(form)
     return tuple(found)
 
@@ -96,7 +107,8 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
 
     The share is of what the others of the set leave. Between axles and sides the reference velocity's noise, which is
     in the slip of all wheels, cancels. What the wheels do must show in their slip: a simulator's error in fast
-    movements is in other channels.
+    movements is in other channels. A smooth function must explain some of the variance where it is half of its largest,
+    too: else it is an offset in one kind of driving, as simulators have it when a car brakes to a stop.
     """
     channels = arena.parts[0].channels
     names, turned = _with_differences(channels)
@@ -107,12 +119,26 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
         left.append(turned @ (p.residual - others)[:, p.mask])
         made.append(turned @ sum((drawn[m] for m in members), np.zeros_like(p.residual))[:, p.mask])
     y, f = np.concatenate(left, axis=1), np.concatenate(made, axis=1)
-    share = 1.0 - (y - f).var(axis=1) / np.maximum(y.var(axis=1), 1e-30)
+    share = _share(y, f, np.ones_like(f))
     rms = np.sqrt((f**2).mean(axis=1))
     large = [bool(r > LEAST[CHANNELS[c].unit] and s > WORTH_TELLING) for r, s, c in zip(rms, share, names, strict=True)]
+    if not arena.shapes[arena.blocks[members[0]].tag].manner:
+        most = np.quantile(np.abs(f), NEARLY_ALL, axis=1, keepdims=True)
+        share = np.where(_share(y, f, np.abs(f) >= 0.5 * most) > 0.0, share, 0.0)
     of_wheels = arena.shapes[arena.blocks[members[0]].tag].mechanism.name.startswith(("slip", "radius"))
     every = zip(large, share.tolist(), names, strict=True)
     return max((x for x in every if not of_wheels or "slip" in x[2]), default=(False, 0.0, channels[0]))
+
+
+def _share(y: FloatArray, f: FloatArray, weight: BoolArray | FloatArray) -> FloatArray:
+    """Share of the variance of channels (C, n) that functions explain, over samples of this weight. (C,)"""
+
+    def variance(x: FloatArray) -> FloatArray:
+        total = weight.sum(axis=1)
+        mean = (weight * x).sum(axis=1) / total
+        return np.asarray((weight * (x - mean[:, None]) ** 2).sum(axis=1) / total)
+
+    return np.asarray(1.0 - variance(y - f) / np.maximum(variance(y), 1e-30))
 
 
 def _drawn(arena: Arena, part: int, member: int, fit: Fitted) -> FloatArray:

@@ -82,6 +82,16 @@ def test_a_form_is_clear_where_no_effect_explains_it():
     assert forms(X @ [0.0, 1.0, 0.0, 0.0, 0.0, 0.0])[0] == []
 
 
+def test_a_form_that_does_not_show_takes_nothing_from_the_others():
+    blocks = [*BLOCKS[:3], block(3, (3,), "shape"), BLOCKS[4]]
+    field = SimpleNamespace(blocks=tuple(blocks), name=lambda m: blocks[m].key)
+    G = 4.0 * inner(X @ [0.0, 0.0, 0.0, 2.0, 0.4, 0.4] + 0.5 * RNG.standard_normal(400))
+    sets = ranked(searched(blocks, G, always), lambda m: blocks[m].key)
+    assert set(sets.best) == {3, 4}
+    assert [c.own for c in clear_forms(field, sets, G)] == [(3,)]
+    assert [c.own for c in clear_forms(field, sets, G, lambda own: own != (3,))] == [(4,)]
+
+
 def test_probabilities_add_up_over_wheels_and_not_over_signals():
     places = [("signal_delay", "a_x"), ("signal_delay", "v_x"), ("slip_stiffness", "fl"), ("slip_stiffness", "r")]
     asked = tuple(Hypothesis(EFFECTS[e], w, ()) for e, w in places)

@@ -243,12 +243,29 @@ def test_what_the_wheels_do_shows_in_their_slip(mechanism, channel):
         residual=f[0] + 0.01 * rng.standard_normal((2, 500)), mask=np.ones(500, dtype=bool),
         channels=("kinematic", "slip_fl"),
     )  # fmt: skip
-    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == mechanism))
+    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == mechanism), manner="")
     block = Block("a", "shape", (0,), np.eye(1), 0.0, 0)
     field = SimpleNamespace(parts=(part,), blocks=(block,), shapes=(shape,), drawn=lambda *_: f)
     is_large, share, where = unexplained._where(field, [0], [0], Fitted([0], np.ones(1), np.eye(1)))
     assert where == channel
     assert (is_large, share > 0.9) == ((True, True) if channel == "kinematic" else (False, False))
+
+
+@pytest.mark.parametrize("manner", ["", "from 10 s to 20 s"])
+def test_an_offset_in_one_kind_of_driving_is_no_smooth_function(manner):
+    """It explains much of a channel, and nothing of how the channel varies where it acts. An interval is an offset."""
+    rng = np.random.default_rng(8)
+    acts = np.arange(500) < 100
+    f = 0.3 * np.where(acts, 1.0 + 0.1 * rng.standard_normal(500), 0.0)[None, None]
+    part = SimpleNamespace(
+        residual=0.3 * acts[None] + 0.02 * rng.standard_normal((1, 500)), mask=np.ones(500, dtype=bool),
+        channels=("kinematic",),
+    )  # fmt: skip
+    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == "force"), manner=manner)
+    block = Block("a", "shape", (0,), np.eye(1), 0.0, 0)
+    field = SimpleNamespace(parts=(part,), blocks=(block,), shapes=(shape,), drawn=lambda *_: f)
+    _, share, _ = unexplained._where(field, [0], [0], Fitted([0], np.ones(1), np.eye(1)))
+    assert share == pytest.approx(0.95 if manner else 0.0, abs=0.04)
 
 
 @pytest.mark.parametrize("drivetrain", ["awd", "rwd"])
@@ -283,7 +300,7 @@ def test_between_axles_the_noise_of_the_velocity_cancels():
     part = SimpleNamespace(
         residual=residual, mask=np.ones(500, dtype=bool), channels=("slip_fl", "slip_fr", "slip_rl", "slip_rr")
     )
-    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == "slip_r"))
+    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == "slip_r"), manner="")
     blocks = tuple(Block(n, "shape", (i,), np.eye(1), 0.0, 0) for i, n in enumerate("ab"))
     drawn = {"a": own[None], "b": other[None]}
     field = SimpleNamespace(parts=(part,), blocks=blocks, shapes=(shape,), drawn=lambda _i, b: drawn[b.key])
