@@ -17,8 +17,8 @@ __all__ = ["repeats", "silent"]
 THIRDS = 3
 SEEN = 2.0  # standard deviations at which a third of the drive says something of a value
 # least share of what an effect of the wheels explains, in what their speeds show: right names had 0.31 and more, one of
-# all driven wheels 0.14, wrong ones beside measured noise 0.04 and less (S)
-BY_WHEELS = 0.1
+# four driven wheels 0.14, wrong ones beside measured noise 0.04 and less, one 0.14 (S)
+BY_WHEELS = 0.2
 # what effects show one by one, over what they show together, from which on they cancel: ten right pairs of another
 # simulator had 0.7 to 1.1, a torque gain with a trailer for a slip slope 12 (S)
 CANCELS = 3.0
