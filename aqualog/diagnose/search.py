@@ -46,9 +46,8 @@ FORM = 0.3
 NEAR = 10.0  # [nats] behind the best set, within which a single effect is refitted, and the rival of each of its own
 # share of what an effect shows that a channel may show more or less than in the simulator, and an interval allows (K)
 DOUBT = 0.05
-# share of what a set explains, by which a simulator of other structure errs: one more effect has to explain more; with
-# half of it or all of it no false member among 46 drives of another simulator (S)
-STRUCTURE = 0.005
+# share of what a set explains, by which a simulator of other structure errs: one more effect has to explain more (K)
+STRUCTURE = 0.01
 UNUSUAL = 3.0  # of its prior's standard deviations, beyond which a value is not listed by a relation alone
 
 Tell = Callable[[str, float], None]
