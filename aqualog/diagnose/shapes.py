@@ -40,7 +40,7 @@ class Mechanism:
     @property
     def is_whole(self) -> bool:
         """Whether it is of all axles at once, beside mechanisms of one axle each."""
-        return self.family == self.name
+        return self.name == f"{self.family}_all"
 
 
 ALONG = ("t", "position")
@@ -67,7 +67,7 @@ MECHANISMS: tuple[Mechanism, ...] = (
     Mechanism("slip_r", "the slip slope of the rear axle", "slip_stiffness@r", "-", 0.3, 0.035, _SLIP, is_fast=True,
               family="slip"),
     Mechanism(
-        "slip", "the slip slope of all wheels", "slip_stiffness", "-", 0.3, 0.035,
+        "slip_all", "the slip slope of all wheels", "slip_stiffness", "-", 0.3, 0.035,
         (("torque",), ("v_x",), ("a_y",), ("yaw_rate",), ("since_braking",)), family="slip",
     ),
     Mechanism(

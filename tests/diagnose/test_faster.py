@@ -10,6 +10,7 @@ from aqualog.diagnose.faster import Faster, joined, pooled, remarks, to_causes, 
 from aqualog.diagnose.full_rate import PerTurn
 from aqualog.diagnose.records import Cause
 from aqualog.diagnose.seams import Seam
+from aqualog.diagnose.unknown_term import short_form
 from aqualog.diagnose.verdict import Outcome
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
@@ -93,6 +94,7 @@ def test_a_wheel_that_varies_unlike_the_others_is_an_unknown_form():
     assert form.f[0] == pytest.approx(form.f[-1])
     assert np.count_nonzero(np.diff(np.sign(form.f))) == 4  # twice per turn
     assert "wheel RR, varying twice per turn by 0.15%, 5 times" in form.sentence
+    assert short_form(form) == form.manner
     assert joined(Outcome("no_effect", ()), Faster(forms=(form,))).verdict == "unexplained"
     assert joined(Outcome("cannot_tell", (MASS,)), Faster(forms=(form,))).verdict == "cannot_tell"
     for others in ([replace(x, amplitude=8e-4) for x in small], [*small, ring("rr")], []):

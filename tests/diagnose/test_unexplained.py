@@ -284,10 +284,10 @@ def test_a_slip_of_all_wheels_is_one_form(drivetrain):
     )  # fmt: skip
     asked = tuple(hypothesis("slip_stiffness", w) for w in made)
     a = arena_of(make_evidence([drive], asked, [y], [[x[None] for x in made.values()]], Model()), [])
-    assert ("slip" in {s.mechanism.name for s in a.shapes}) == (drivetrain == "awd")
+    assert ("slip_all" in {s.mechanism.name for s in a.shapes}) == (drivetrain == "awd")
     assert {a.name(i) for i, b in enumerate(a.blocks) if b.kind == "shape"} == {"slip()"}
     found = unknown_forms(a, compete(a), seed=1)
-    assert [(r.mechanism, r.depends_on) for r in found] == ([("slip", ("torque",))] if drivetrain == "awd" else [])
+    assert [(r.mechanism, r.depends_on) for r in found] == ([("slip_all", ("torque",))] if drivetrain == "awd" else [])
     assert all("all wheels" in r.sentence for r in found)
 
 
