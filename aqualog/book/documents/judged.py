@@ -101,7 +101,7 @@ DIAGNOSE = Document(
         )),
         rows("unexplained", "what no effect of the library explains", (
             text("channel", "residual, or `axle_slip`, `side_slip_f`, `side_slip_r`: differences of wheels' slip"),
-            text("mechanism", "what it acts through: force, accelerometer, torque, slip_f, slip_all, ...; null of a campaign",
+            text("mechanism", "what it acts through: force, torque, slip_f, slip_all, ...; null of a campaign",
                  null=True),
             text("unit", "unit of the function; empty: that of the channel"),
             several("depends_on", "signals that it is a function of; last, not in `x`, the one that a gain multiplies"),
