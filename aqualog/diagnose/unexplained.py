@@ -169,7 +169,10 @@ def described(
     others = {
         field.shapes[field.blocks[o].tag].coordinates: q
         for o, q in found.blocks.items()
-        if o != m and field.blocks[o].kind == "shape" and field.name(o) == field.name(m) and q >= NOTABLE
+        if o != m
+        and field.blocks[o].kind == "shape"
+        and q >= NOTABLE
+        and field.shapes[field.blocks[o].tag].mechanism is s.mechanism
     }
     alike = sorted({n for c, q in others.items() if q >= ALIKE * found.blocks[m] for n in c} - set(s.coordinates))
     nearest, cosine = _nearest(field.blocks, gram, m, fit.mean[own])
