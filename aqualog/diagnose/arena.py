@@ -21,7 +21,7 @@ from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.evidence import Evidence, forgiving
 from aqualog.diagnose.hypotheses import Hypothesis, residual
 from aqualog.diagnose.noise import white_noise
-from aqualog.diagnose.shapes import ALONG, Shape, shapes
+from aqualog.diagnose.shapes import ALONG, Mechanism, Shape, shapes
 from aqualog.diagnose.spectrum import Weighing, weighing
 from aqualog.diagnose.threads import beside
 from aqualog.model.effects import EMPIRICAL
@@ -66,12 +66,16 @@ class Field:
     shapes: tuple[Shape, ...]
 
     def name(self, block: int) -> str:
-        """Name by which probabilities add up: that of the hypothesis, or the mechanism of a shape with `()`."""
+        """Name by which probabilities add up: that of the hypothesis, or of the shape's family with `()`."""
         b = self.blocks[block]
         if b.kind == "effect":
             return self.evidence.asked[b.tag].name
-        m = self.shapes[b.tag].mechanism
+        m = self.mechanism(block)
         return f"{m.family or m.name}()"
+
+    def mechanism(self, block: int) -> Mechanism:
+        """Mechanism of a shape."""
+        return self.shapes[self.blocks[block].tag].mechanism
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,8 +10,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.spline import Basis, basis
+from aqualog.model.effects import EFFECTS
 
 __all__ = ["ALONG", "MECHANISMS", "Mechanism", "Shape", "shapes"]
 
@@ -19,7 +22,7 @@ __all__ = ["ALONG", "MECHANISMS", "Mechanism", "Shape", "shapes"]
 @dataclass(frozen=True, slots=True)
 class Mechanism:
     """`source`: effect and place whose signature is the response, in `unit`; `usual` size of a deviation, and
-    the one by which a car and its simulation differ anyway. `family`: its probability is that of all of these together.
+    the one by which a car and its simulation differ anyway. `family`: whether there is a form is asked of all of these.
 
     `over`: coordinates of its functions, alone or in pairs; `scales`: the signal that it multiplies, on which what it
     does depends as well.
@@ -41,6 +44,16 @@ class Mechanism:
     def is_whole(self) -> bool:
         """Whether it is of all axles at once, beside mechanisms of one axle each."""
         return self.name == f"{self.family}_all"
+
+    def change(self, size: FloatArray) -> FloatArray:
+        """Change of the effect's value that acts as this size of the response does; NaN where no value does.
+
+        They are the same, but for what acts as one over its value: twice the slip is half the slip slope.
+        """
+        effect = EFFECTS.get(self.source.partition("@")[0])
+        if effect is None or not effect.drive.divides:
+            return size
+        return 1.0 / np.where(size < 1.0, 1.0 - size, np.nan) - 1.0
 
 
 ALONG = ("t", "position")
@@ -67,7 +80,7 @@ MECHANISMS: tuple[Mechanism, ...] = (
     Mechanism("slip_r", "the slip slope of the rear axle", "slip_stiffness@r", "-", 0.3, 0.035, _SLIP, is_fast=True,
               family="slip"),
     Mechanism(
-        "slip_all", "the slip slope of all wheels", "slip_stiffness", "-", 0.3, 0.035,
+        "slip_all", "the slip slope of all driven wheels", "slip_stiffness", "-", 0.3, 0.035,
         (("torque",), ("v_x",), ("a_y",), ("yaw_rate",), ("since_braking",)), family="slip",
     ),
     Mechanism(

@@ -18,6 +18,7 @@ from aqualog.diagnose.competition import Block
 from aqualog.diagnose.hypotheses import WORTH
 from aqualog.diagnose.records import SURE, Remainder, tempered
 from aqualog.diagnose.sets import Sets, evidence_of, fitted_in
+from aqualog.diagnose.shapes import Mechanism
 from aqualog.diagnose.unknown_term import ALIKE as SAME
 from aqualog.diagnose.unknown_term import describe
 
@@ -37,12 +38,14 @@ DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points
 class Clear(NamedTuple):
     """A mechanism that no known effect replaces: its blocks, `first` the most needed one, and its probability.
 
-    `loss`: what the best set loses without it [nats (natural logarithm)].
+    `instead`: mechanisms of its family that the drive cannot distinguish from it. `loss`: what the best set loses
+    without it [nats (natural logarithm)].
     """
 
     own: tuple[int, ...]
     first: int
     probability: float
+    instead: tuple[Mechanism, ...]
     loss: float
 
 
@@ -51,31 +54,53 @@ def clear_forms(
 ) -> list[Clear]:
     """Mechanisms of the best set that no known effect replaces, what explains most first.
 
-    A mechanism counts if its share of the posterior is 0.95, the best set is e^3 times as likely as every set of known
-    effects, its blocks show in the drives, and it explains a fifth of what the set explains, without mechanisms that do
-    not show.
+    A mechanism counts if its family has a share of 0.95 of the posterior, the best set is e^3 times as likely as every
+    set of known effects, its blocks show in the drives, and it explains a fifth of what the set explains, without
+    mechanisms that do not show. What a family explains together is its most needed mechanism's.
     """
-    blocks, name, best = field.blocks, field.name, found.best
+    blocks, best = field.blocks, found.best
     known = max(e for members, e in found.sets if all(blocks[m].kind != "shape" for m in members))
     if found.sets[0][1] - known < AHEAD:
         return []
+    sure = [m for m in best if blocks[m].kind == "shape" and found.marginal[field.name(m)] >= SURE]
     # over two coordinates that go together, either could be left out; the mechanism could not
-    names = dict.fromkeys(name(m) for m in best if blocks[m].kind == "shape")
-    sure = [tuple(m for m in best if name(m) == n) for n in names if found.marginal[n] >= SURE]
-    clear = [own for own in sure if shows(own)]
-    hidden = {m for own in sure if own not in clear for m in own}
+    each = [tuple(m for m in sure if field.mechanism(m) == n) for n in dict.fromkeys(map(field.mechanism, sure))]
+    clear = [own for own in each if shows(own)]
+    hidden = {m for own in each if own not in clear for m in own}
 
     def evidence(without: Container[int]) -> float:
         return evidence_of(blocks, inner, [m for m in best if m not in without])
 
     whole, counted = evidence(()), evidence(hidden)
     out = []
-    for own in clear:
-        loss = whole - evidence(own)
-        if loss >= PART * counted:
+    for family in dict.fromkeys(field.name(own[0]) for own in clear):
+        needed = [(whole - evidence(own), own) for own in clear if field.name(own[0]) == family]
+        enough = [x for x in needed if x[0] >= PART * counted]
+        if not enough and whole - evidence([m for _, own in needed for m in own]) >= PART * counted:
+            enough = [max(needed)]
+        for loss, own in enough:
             first = min(own, key=lambda m: evidence((m,)))
-            out.append(Clear(own, first, tempered(found.marginal[name(first)]), loss))
+            # beside others of its family that do as well without it, it is one of them
+            alike = 1 if loss >= PART * counted else len(needed)
+            probability, instead = _of_mechanism(field, found, first, [o[0] for _, o in needed] if alike > 1 else [])
+            out.append(Clear(own, first, tempered(probability / alike), instead, loss))
     return sorted(out, key=lambda c: -c.loss)
+
+
+def _of_mechanism(
+    field: Field, found: Sets, block: int, alike: Sequence[int]
+) -> tuple[float, tuple[Mechanism, ...]]:  # fmt: skip
+    """Share of the sets with a block's mechanism, and those of its family that other sets, or blocks `alike`, have."""
+    own = field.mechanism(block)
+    share, others = 0.0, {field.mechanism(m): math.inf for m in alike}
+    for (members, _), q in zip(found.sets, found.probability.tolist(), strict=True):
+        shapes = [m for m in members if field.blocks[m].kind == "shape" and field.name(m) == field.name(block)]
+        mechanisms = {field.mechanism(m) for m in shapes}
+        if own in mechanisms:
+            share += q
+        else:
+            others |= {m: others.get(m, 0.0) + q for m in mechanisms}
+    return share, tuple(m for m, q in others.items() if q >= ALIKE * share and m is not own)
 
 
 def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
@@ -95,7 +120,7 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     for c in clear_forms(arena, posterior, posterior.tolerant, lambda own: where(own)[1] > WORTH_TELLING):
         is_large, share, channel = where(c.own)
         form = described(arena, posterior, posterior.gram, fit, c, channel, share, seed)
-        usual = WORTH * arena.shapes[arena.blocks[c.first].tag].mechanism.allowed
+        usual = WORTH * arena.mechanism(c.first).allowed
         is_large |= not form.manner and bool(np.nan_to_num(np.maximum(form.low, -form.high)).max() >= usual)
         if is_large and form.cosine <= SAME:
             found.append(form)
@@ -121,13 +146,20 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
     y, f = np.concatenate(left, axis=1), np.concatenate(made, axis=1)
     share = _share(y, f, np.ones_like(f))
     rms = np.sqrt((f**2).mean(axis=1))
+    if not any(arena.shapes[arena.blocks[m].tag].manner for m in members):
+        share = np.where(_share(y, f, np.abs(f) >= 0.5 * _most(f)) > 0.0, share, 0.0)
     large = [bool(r > LEAST[CHANNELS[c].unit] and s > WORTH_TELLING) for r, s, c in zip(rms, share, names, strict=True)]
-    if not arena.shapes[arena.blocks[members[0]].tag].manner:
-        most = np.quantile(np.abs(f), NEARLY_ALL, axis=1, keepdims=True)
-        share = np.where(_share(y, f, np.abs(f) >= 0.5 * most) > 0.0, share, 0.0)
-    of_wheels = arena.shapes[arena.blocks[members[0]].tag].mechanism.name.startswith(("slip", "radius"))
+    of_wheels = arena.mechanism(members[0]).name.startswith(("slip", "radius"))
     every = zip(large, share.tolist(), names, strict=True)
     return max((x for x in every if not of_wheels or "slip" in x[2]), default=(False, 0.0, channels[0]))
+
+
+def _most(f: FloatArray) -> FloatArray:
+    """Largest size of each function (C, n) where it acts, without its highest 0.5 %. (C, 1)"""
+    size = np.abs(f)
+    acts = size > 1e-3 * size.max(axis=1, keepdims=True)
+    each = [np.quantile(x[a], NEARLY_ALL) if a.any() else 0.0 for x, a in zip(size, acts, strict=True)]
+    return np.array(each)[:, None]
 
 
 def _share(y: FloatArray, f: FloatArray, weight: BoolArray | FloatArray) -> FloatArray:
@@ -166,6 +198,7 @@ def described(
     f = at @ fit.mean[own]
     half = _band(at, fit.covariance[np.ix_(own, own)], s.basis.supported, seed)
     f, half = (np.where(s.basis.supported, x, np.nan) for x in (f, half))
+    f, low, high = (s.mechanism.change(x) for x in (f, f - half, f + half))
     others = {
         field.shapes[field.blocks[o].tag].coordinates: q
         for o, q in found.blocks.items()
@@ -177,10 +210,10 @@ def described(
     alike = sorted({n for c, q in others.items() if q >= ALIKE * found.blocks[m] for n in c} - set(s.coordinates))
     nearest, cosine = _nearest(field.blocks, gram, m, fit.mean[own])
     r = Remainder(
-        channel, s.coordinates, share, math.nan, s.basis.points, f, f - half, f + half, tuple(alike), nearest, cosine,
+        channel, s.coordinates, share, math.nan, s.basis.points, f, low, high, tuple(alike), nearest, cosine,
         "", s.mechanism.name, s.mechanism.unit, clear.probability, s.manner,
     )  # fmt: skip
-    return replace(r, sentence=describe(s.mechanism, r))
+    return replace(r, sentence=describe(s.mechanism, r, clear.instead))
 
 
 def _band(at: FloatArray, covariance: FloatArray, supported: BoolArray, seed: int) -> FloatArray:

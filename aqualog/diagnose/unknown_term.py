@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -79,9 +80,11 @@ _CHANNELS = {
 ALIKE = 0.9  # cosine from which a known effect looks nearly the same
 
 
-def describe(mechanism: Mechanism, r: Remainder) -> str:
-    """Sentences: mechanism and coordinate, its largest value, coordinates that explain it as well, similar effects."""
-    title = _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title.lower() if r.channel in CHANNELS else r.channel)
+def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = ()) -> str:
+    """Sentences: mechanism and coordinate, its largest value, coordinates and mechanisms that explain it as well,
+    similar effects."""
+    title = _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title if r.channel in CHANNELS else r.channel)
+    title = f"{title[:1].lower()}{title[1:]}"
     how = r.manner or f"goes with {' and '.join(map(_title, r.depends_on))}"
     text = f"Unexplained: {mechanism.title} {how} (probability {r.probability:.2f}"
     text += f"; {r.share:.0%} of the variance of the {title}"
@@ -91,8 +94,8 @@ def describe(mechanism: Mechanism, r: Remainder) -> str:
         there = ", ".join(f"{v:.4g} {COORDINATES[n].unit}" for n, v in zip(r.depends_on, r.x[at], strict=True))
         text += f"; {quantity(float(r.f[at]), mechanism.unit, change=True)} at {there}"
     text += ")."
-    if r.proxies:
-        text += f" It cannot be distinguished from {listed([*map(_title, r.proxies)])} here."
+    if alike := [*(m.title for m in instead), *map(_title, r.proxies)]:
+        text += f" It cannot be distinguished from {listed(alike)} here."
     # what comes again at equal ways does not at equal times, unless the speed never changes: then both are likely
     if {"t", "position"} & set(r.depends_on) and not r.manner.startswith(("in waves", "for ")):
         text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."

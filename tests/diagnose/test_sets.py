@@ -28,7 +28,11 @@ def block(i, columns, kind="effect"):
 BLOCKS = [*(block(i, (i,)) for i in range(4)), block(4, (4, 5), "shape")]
 
 
-FIELD = SimpleNamespace(blocks=tuple(BLOCKS), name=lambda m: BLOCKS[m].key)
+def field_of(blocks):
+    def name(m):
+        return blocks[m].key
+
+    return SimpleNamespace(blocks=tuple(blocks), name=name, mechanism=name)
 
 
 def always(state, other):
@@ -74,7 +78,7 @@ def test_a_form_is_clear_where_no_effect_explains_it():
     def forms(y):
         G = 4.0 * inner(y + 0.5 * RNG.standard_normal(400))
         sets = ranked(searched(BLOCKS, G, always), lambda m: BLOCKS[m].key)
-        return [c.own for c in clear_forms(FIELD, sets, G)], sets, G
+        return [c.own for c in clear_forms(field_of(BLOCKS), sets, G)], sets, G
 
     shaped, sets, G = forms(X @ [0.0, 1.0, 0.0, 0.0, 0.8, 0.8])
     assert shaped == [(4,)]
@@ -84,7 +88,7 @@ def test_a_form_is_clear_where_no_effect_explains_it():
 
 def test_a_form_that_does_not_show_takes_nothing_from_the_others():
     blocks = [*BLOCKS[:3], block(3, (3,), "shape"), BLOCKS[4]]
-    field = SimpleNamespace(blocks=tuple(blocks), name=lambda m: blocks[m].key)
+    field = field_of(blocks)
     G = 4.0 * inner(X @ [0.0, 0.0, 0.0, 2.0, 0.4, 0.4] + 0.5 * RNG.standard_normal(400))
     sets = ranked(searched(blocks, G, always), lambda m: blocks[m].key)
     assert set(sets.best) == {3, 4}

@@ -174,7 +174,7 @@ def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...]
     for c in clear_forms(ring, sets, gram):
         own = [i for m in c.own for i in ring.blocks[m].columns]
         form = ring.functions[:, :, [i - k for i in own]] @ linear.mean[[linear.columns.index(i) for i in own]]
-        name = ring.shapes[ring.blocks[c.first].tag].mechanism.name
+        name = ring.mechanism(c.first).name
         # share of the variance, where the mechanism acts, that the form explains
         own = _channels(passes.names)[name]
         share = max(1.0 - float(np.nanvar((stand.y - form)[:, own]) / np.nanvar(stand.y[:, own])), 0.0)
