@@ -178,7 +178,7 @@ def test_kinds_are_the_contracts_and_forms_besides():
     assert set(known) == set(EFFECTS)
     assert not set(unknown) & set(EFFECTS)
     assert len(unknown) >= 10
-    assert len(HELD_BACK) == 6
+    assert len(HELD_BACK) == 5
     assert not set(HELD_BACK) & set(names_of(known=False))
     for name in known:
         for h in (draw(name, np.random.default_rng(s)) for s in range(6)):
@@ -203,7 +203,7 @@ def test_every_kind_changes_its_drive(name):
     late = {k: 4.0 for k in h.values if k == "start"}
     h = replace(h, values={**h.values, **late})
     off = replace(h, values={**h.values, **dict.fromkeys(KINDS[name].worth[h.where], KINDS[name].neutral)})
-    seconds, programme = (60.0, "city") if name == "lingering_brake" else (12.0, KINDS[name].programmes[0])
+    seconds, programme = (60.0, "city") if name in ("lingering_brake", "slate") else (12.0, KINDS[name].programmes[0])
     seen = clean_messages(programme, seconds, h), clean_messages(programme, seconds)
     none = clean_messages(programme, seconds, off)
     assert all(
@@ -227,6 +227,9 @@ def test_odd_forces_are_where_they_say():
     assert force("way_waves", way=50.0, force=80.0, period=200.0, phase=0.0) == pytest.approx(80.0)
     assert force("steering_drag", steer=-0.1, force=5000.0) == pytest.approx(500.0)
     assert force("odd_hours", share=0.05, force=50.0) == pytest.approx(-50.0, rel=0.1)
+    given = {"force": 80.0, "period": 700.0, "phase": 0.0}
+    at = [force("quartz", v=v, way=w, **given) for v, w in ((20.0, 175.0), (10.0, 875.0), (20.0, 525.0))]
+    assert at == pytest.approx([80.0, 20.0, 0.0], rel=0.01, abs=0.1)
     given = {"force": 90.0, "side": -1.0, "threshold": 0.8, "width": 0.1}
     at = [force("basalt", a_side=a, **given) for a in (-2.0, -0.8, 0.0, 2.0)]
     assert at == pytest.approx([90.0, 45.0, 0.0, 0.0], abs=1e-3)
@@ -252,6 +255,16 @@ def test_odd_tyres_and_sensors_are_where_they_say():
     assert added == pytest.approx(0.03 * true["a_x"] ** 2, abs=1e-9)
     added = seen(Hidden("dolomite", "a_y", {"shake": 0.3, "centre": 18.0, "width": 2.0}))["a_y"] - true["a_y"]
     assert added == pytest.approx(0.3 / (1.0 + (0.5 * (true["v_x"] - 18.0)) ** 2), abs=1e-3)
+    added = seen(Hidden("mica", "a_x", {"tip": 0.1, "threshold": 0.3}))["a_x"] - true["a_x"]
+    beyond = np.abs(true["a_y"]) > 0.5
+    assert np.any(beyond)
+    assert added[beyond] == pytest.approx(0.1 * np.sign(true["a_y"][beyond]), abs=1e-9)
+    by = {s: x - true[s] for s, x in seen(Hidden("chalk", None, {"torque": 30.0})).items() if s.startswith("torque")}
+    big = {s: np.abs(true[s]) > 100.0 for s in by}
+    assert max(np.abs(x).max() for x in by.values()) == pytest.approx(0.43 * 30.0, rel=0.02)
+    assert all(np.abs(x[big[s]]).max(initial=0.0) < 0.01 for s, x in by.items())
+    ratio = seen(Hidden("flint", "v_x", {"scale": 0.01, "period": 8.0, "phase": 0.0}))["v_x"] / true["v_x"]
+    assert ratio[[200, 600, 1000]] == pytest.approx([1.01, 0.99, 1.01], abs=1e-4)
 
 
 def test_a_case_is_a_function_of_seed_and_number():

@@ -110,6 +110,8 @@ class Odd(NamedTuple):
     linger: np.ndarray = np.array([0.0, 20.0])  # N m, s
     chafe: np.ndarray = np.array([0.0, 1.0, 0.9, 0.2])  # N, side of the bend, m/s^2, m/s^2
     hum: np.ndarray = np.array([0.0, 20.0, 2.0])  # share of the slope, m/s, m/s
+    stretch: np.ndarray = np.array([0.0, 700.0, 0.0])  # N at 20 m/s, m, rad
+    soft: np.ndarray = np.array([0.0])  # share of the slope
 
 
 NO_ODD = Odd()

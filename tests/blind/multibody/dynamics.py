@@ -61,6 +61,9 @@ def odd_force(t, share, v, way, steer, torque, a_side, odd):
         F += odd.valley[0] * _bell(v, odd.valley[1], odd.valley[2]) * _bell(torque, odd.valley[3], odd.valley[4])
     if odd.chafe[0] != 0.0:
         F += odd.chafe[0] * 0.5 * (1.0 + tanh((odd.chafe[1] * a_side - odd.chafe[2]) / odd.chafe[3]))
+    if odd.stretch[0] != 0.0:  # by the square of speed, on two fifths of the way
+        on = tanh(4.0 * sin(2.0 * pi * way / odd.stretch[1] + odd.stretch[2]) - 1.2)
+        F += odd.stretch[0] * (v / 20.0) ** 2 * 0.5 * (1.0 + on)
     return F * tanh(v / 0.5)
 
 
@@ -114,7 +117,7 @@ def _driveline(y, f, aux, drive, gear, p):
 
 
 @compiled
-def _slope(i, t, y, aux, leak, lost, p, odd):
+def _slope(i, t, y, aux, leak, lost, p, odd, linger):
     slope = p.slope[i] * load_factor(aux[LOAD + i], p.load_ref[i], p.load_law[i])
     slope *= exp(p.slope_drift[i] * t) * (1.0 + p.leak_slope[i] * leak) * (1.0 - lost) ** p.law[9]
     if odd.saddle[0] != 0.0:
@@ -123,6 +126,7 @@ def _slope(i, t, y, aux, leak, lost, p, odd):
         slope *= 1.0 / (1.0 + odd.turning[0] * abs(y[YAW]))
     if odd.hum[0] != 0.0:
         slope *= 1.0 - odd.hum[0] * _bell(y[VX], odd.hum[1], odd.hum[2])
+    slope *= 1.0 - odd.soft[0] * linger
     return slope
 
 
@@ -159,7 +163,7 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
             push = water_push(u, film, p.law) * p.water_gain[i]
             mu *= 0.78 * (1.0 - lost)
         rolls = y[BELT + i] * r_e
-        slope = _slope(i, t, y, aux, leak, lost, p, odd)
+        slope = _slope(i, t, y, aux, leak, lost, p, odd, linger)
         f[BRISTLE_X + i] = rolls - u - abs(rolls) / p.bristle_x[i] * y[BRISTLE_X + i]
         f[BRISTLE_Y + i] = -w - abs(rolls) / p.bristle_y[i] * y[BRISTLE_Y + i]
         s_x, s_y = y[BRISTLE_X + i] / p.bristle_x[i], y[BRISTLE_Y + i] / p.bristle_y[i]

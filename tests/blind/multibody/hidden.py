@@ -195,6 +195,17 @@ def _torque_scale(s: Setup, v: Values, _: str | None) -> Setup:
     return s
 
 
+def _dead(s: Setup, v: Values, _: str | None) -> Setup:
+    of = _signal("torque", lambda e, w: e._replace(dead=w["torque"]))
+    for i in s.driven:
+        s = of(s, v, f"torque_{WHEELS[i]}")
+    return s
+
+
+def _soft(s: Setup, v: Values, _: str | None) -> Setup:
+    return replace(s, odd=s.odd._replace(soft=np.array([v["depth"]]), linger=np.array([0.0, v["time"]])))
+
+
 def _ripple(s: Setup, v: Values, where: str | None) -> Setup:
     values = np.array([v["torque"], float(_AT[where][0]), v["order"]])
     return replace(s, odd=s.odd._replace(ripple=values))
@@ -310,29 +321,44 @@ _UNKNOWN = {
     "lingering_brake": _form(
         _by("torque", all_=16.0), _odd("linger", "torque", "time"), "force_balance", ("time since braking",),
         programmes=("country", "city", "staircase"), signs=1, shape=lambda rng: {"time": rng.uniform(14.0, 26.0)}),
-    # held back; tables of scores show the names, so the last ones say nothing
+    # tables of scores show the names, so the last ones say nothing
     "torque_speed_valley": _form(
         _by("force", all_=110.0), _valley, "force_balance", ("v_x", "torque"), programmes=("country", "staircase"),
-        held_back=True, shape=lambda rng: {
+        shape=lambda rng: {
             "centre": rng.uniform(14.0, 23.0), "width": rng.uniform(3.0, 5.0), "acceleration": rng.uniform(0.6, 1.2)}),
-    "torque_read_in_speed": _form(
-        _by("rate", all_=0.015), _torque_scale, "slip", ("torque",), programmes=LIVELY, held_back=True),
+    "torque_read_in_speed": _form(_by("rate", all_=0.015), _torque_scale, "slip", ("torque",), programmes=LIVELY),
     "feldspar": _form(
         _by("square", a_x=0.006), _signal("a_x", lambda e, v: e._replace(square=v["square"])), "accelerometer", ("a_x",),
-        programmes=("city", "country", "staircase", "coast_down"), held_back=True),
+        programmes=("city", "country", "staircase", "coast_down")),
     "dolomite": _form(
         _by("shake", a_y=0.1), _signal("a_y", lambda e, v: e._replace(shake=(v["shake"], v["centre"], v["width"]))),
-        "lateral", ("v_x",),
-        programmes=("country", "staircase", "coast_down"), held_back=True,
+        "lateral", ("v_x",), programmes=("country", "staircase", "coast_down"),
         shape=lambda rng: {"centre": rng.uniform(20.0, 28.0), "width": rng.uniform(1.2, 2.5)}),
     "gneiss": _form(
         _by("depth", all_=0.12), _odd("hum", "depth", "centre", "width"), "slip", ("v_x",),
-        programmes=("country", "staircase"), signs=1, held_back=True,
+        programmes=("country", "staircase"), signs=1,
         shape=lambda rng: {"centre": rng.uniform(15.0, 23.0), "width": rng.uniform(1.5, 3.0)}),
     "basalt": _form(
         _by("force", all_=60.0), _odd("chafe", "force", "side", "threshold", "width"), "force_balance", ("a_y",),
-        programmes=("city", "country"), signs=1, held_back=True, shape=lambda rng: {
+        programmes=("city", "country"), signs=1, shape=lambda rng: {
             "side": float(rng.choice([-1, 1])), "threshold": rng.uniform(0.6, 0.9), "width": rng.uniform(0.1, 0.25)}),
+    "quartz": _form(
+        _by("force", all_=60.0), _odd("stretch", "force", "period", "phase"), "force_balance", ("position", "v_x"),
+        programmes=("country", "staircase"), signs=1, on_the_road=True, held_back=True,
+        shape=lambda rng: {"period": rng.uniform(450.0, 900.0), "phase": rng.uniform(0.0, 6.28)}),
+    "mica": _form(
+        _by("tip", a_x=0.015), _signal("a_x", lambda e, v: e._replace(tip=(v["tip"], v["threshold"]))), "accelerometer",
+        ("a_y",), programmes=("city", "country"), held_back=True, shape=lambda rng: {"threshold": rng.uniform(0.4, 0.8)}),
+    "slate": _form(
+        _by("depth", all_=0.12), _soft, "slip", ("time since braking",), programmes=LIVELY, signs=1, held_back=True,
+        shape=lambda rng: {"time": rng.uniform(16.0, 30.0)}),
+    "chalk": _form(
+        _by("torque", all_=10.0), _dead, "force_balance", ("torque",), signs=1, held_back=True,
+        programmes=("city", "country", "staircase", "coast_down")),
+    "flint": _form(
+        _by("scale", v_x=0.0007), _signal("v_x", lambda e, w: e._replace(pulse=(w["scale"], w["period"], w["phase"]))),
+        "slip", ("time",), programmes=("country", "motorway", "staircase"), signs=1, held_back=True,
+        shape=lambda rng: {"period": rng.uniform(22.0, 40.0), "phase": rng.uniform(0.0, 6.28)}),
 }  # fmt: skip
 
 KINDS: Mapping[str, Kind] = {**_KNOWN, **_UNKNOWN}

@@ -52,7 +52,9 @@ class Error(NamedTuple):
     """Hidden errors of a signal: gain (1 + by_speed (v - 15)) x + bias + drift t, late; of a wheel speed the ring as well.
 
     `by_torque`: relative reading per square of the wheel's torque in kN m. `square`: added per square of the signal.
-    `shake`: added at a speed [m/s], half of it so much beside that [m/s].
+    `shake`: added at a speed [m/s], half of it so much beside that [m/s]. `tip`: added with the sign of the lateral
+    acceleration that was last beyond so much [m/s^2]. `dead`: of the signal, below which it is hardly read.
+    `pulse`: relative, up and down over a period [s] from a phase on [rad].
     """
 
     gain: float = 1.0
@@ -65,6 +67,9 @@ class Error(NamedTuple):
     ring: float = 0.0
     square: float = 0.0
     shake: tuple[float, float, float] = (0.0, 20.0, 2.0)
+    tip: tuple[float, float] = (0.0, 0.5)
+    dead: float = 0.0
+    pulse: tuple[float, float, float] = (0.0, 30.0, 0.0)
 
 
 class Message(NamedTuple):
@@ -132,6 +137,10 @@ def _messages(rows, car, errors, noise, rng):
             v = rows[:, ROWS["v_x"]]
             x = x * (1.0 + e.by_speed * (v - 15.0)) + e.square * x * x
             x = x + e.shake[0] / (1.0 + ((v - e.shake[1]) / e.shake[2]) ** 2)
+            x = x + e.tip[0] * _last_side(rows[:, ROWS["a_y"]], e.tip[1])
+            if e.dead != 0.0:
+                x = -x * np.expm1(-((x / e.dead) ** 2))
+            x = x * (1.0 + e.pulse[0] * np.tanh(3.0 * np.sin(2.0 * np.pi * middle / e.pulse[1] + e.pulse[2])))
             when = t / (1.0 + e.skew * 1e-6) - e.delay + offset
             x = CubicSpline(middle, x)(np.clip(when, middle[0], middle[-1]))
             x = e.gain * x + e.bias + e.drift * t
@@ -145,6 +154,12 @@ def _messages(rows, car, errors, noise, rng):
             columns[symbol] = x
         out.append(Message(name, t, columns))
     return out
+
+
+def _last_side(x: np.ndarray, threshold: float) -> np.ndarray:
+    """Sign (n,) of what was last beyond the threshold, nought before the first."""
+    last = np.maximum.accumulate(np.where(np.abs(x) > threshold, np.arange(x.size), -1))
+    return np.where(last < 0, 0.0, np.sign(x[last]))
 
 
 def _truth(rows, car, errors, phases, noise, rng):
