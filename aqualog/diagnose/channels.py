@@ -36,7 +36,7 @@ class Kind(NamedTuple):
 CHANNELS: dict[str, Kind] = {
     "force_balance": Kind("Force balance", "m/s^2"),
     "kinematic": Kind("Kinematic", "m/s^2"),
-    **{f"slip_{w}": Kind(f"Slip {w}", "m/s") for w in WHEELS},
+    **{f"slip_{w}": Kind(f"Slip {w.upper()}", "m/s") for w in WHEELS},
     "axle_slip": Kind("Slip between axles", "m/s"),
     "side_slip_f": Kind("Slip between front wheels", "m/s"),
     "side_slip_r": Kind("Slip between rear wheels", "m/s"),

@@ -29,8 +29,7 @@ PART = 0.2  # of what the best set explains
 WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
 NEARLY_ALL = 0.995  # of a function's values, whose largest counts
 LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what is large, by the channel's unit
-NOTABLE = 0.05  # probability from which another coordinate is mentioned
-ALIKE = 0.2  # share of the best coordinate's probability from which the drive cannot distinguish another
+ALIKE = 0.2  # share of the best one's probability from which the drive cannot distinguish another coordinate or axle
 _SLIPS = tuple(f"slip_{w}" for w in WHEELS)
 DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points together
 
@@ -91,16 +90,15 @@ def _of_mechanism(
     field: Field, found: Sets, block: int, alike: Sequence[int]
 ) -> tuple[float, tuple[Mechanism, ...]]:  # fmt: skip
     """Share of the sets with a block's mechanism, and those of its family that other sets, or blocks `alike`, have."""
-    own = field.mechanism(block)
     share, others = 0.0, {field.mechanism(m): math.inf for m in alike}
     for (members, _), q in zip(found.sets, found.probability.tolist(), strict=True):
-        shapes = [m for m in members if field.blocks[m].kind == "shape" and field.name(m) == field.name(block)]
-        mechanisms = {field.mechanism(m) for m in shapes}
-        if own in mechanisms:
+        family = [m for m in members if field.blocks[m].kind == "shape" and field.name(m) == field.name(block)]
+        mechanisms = dict.fromkeys(map(field.mechanism, family))
+        if field.mechanism(block) in mechanisms:
             share += q
         else:
             others |= {m: others.get(m, 0.0) + q for m in mechanisms}
-    return share, tuple(m for m, q in others.items() if q >= ALIKE * share and m is not own)
+    return share, tuple(m for m, q in others.items() if q >= ALIKE * share and m is not field.mechanism(block))
 
 
 def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Remainder, ...]:
@@ -199,15 +197,9 @@ def described(
     half = _band(at, fit.covariance[np.ix_(own, own)], s.basis.supported, seed)
     f, half = (np.where(s.basis.supported, x, np.nan) for x in (f, half))
     f, low, high = (s.mechanism.change(x) for x in (f, f - half, f + half))
-    others = {
-        field.shapes[field.blocks[o].tag].coordinates: q
-        for o, q in found.blocks.items()
-        if o != m
-        and field.blocks[o].kind == "shape"
-        and q >= NOTABLE
-        and field.shapes[field.blocks[o].tag].mechanism is s.mechanism
-    }
-    alike = sorted({n for c, q in others.items() if q >= ALIKE * found.blocks[m] for n in c} - set(s.coordinates))
+    likely = [o for o, q in found.blocks.items() if field.blocks[o].kind == "shape" and q >= ALIKE * found.blocks[m]]
+    over = [field.shapes[field.blocks[o].tag].coordinates for o in likely if field.mechanism(o) is s.mechanism]
+    alike = sorted({n for c in over for n in c} - set(s.coordinates))
     nearest, cosine = _nearest(field.blocks, gram, m, fit.mean[own])
     r = Remainder(
         channel, s.coordinates, share, math.nan, s.basis.points, f, low, high, tuple(alike), nearest, cosine,
