@@ -155,7 +155,7 @@ class Remainder:
     `x` (k, d) points of the coordinates `depends_on` [SI], `f`, `low`, `high` (k,) in `unit`, or in the channel's if
     that is empty; `mechanism` that it acts through; `share` of the channel's variance that it
     explains; `proxies`: coordinates that explain it nearly as well; `nearest`: effect whose signature is most alike,
-    with the cosine; `probability` of the mechanism; `p_value` NaN where no test was made; `manner`:
+    with the cosine; `probability` of the mechanism itself; `p_value` NaN where no test was made; `manner`:
     `from 66 s to 145 s` or `in waves of 197 m`, empty if it is any smooth function.
     """
 
