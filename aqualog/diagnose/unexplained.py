@@ -118,11 +118,27 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     for c in clear_forms(arena, posterior, posterior.tolerant, lambda own: where(own)[1] > WORTH_TELLING):
         is_large, share, channel = where(c.own)
         form = described(arena, posterior, posterior.gram, fit, c, channel, share, seed)
-        usual = WORTH * arena.mechanism(c.first).allowed
-        is_large |= not form.manner and bool(np.nan_to_num(np.maximum(form.low, -form.high)).max() >= usual)
+        is_large |= not form.manner and _surely(arena, fit, c.first, seed) >= WORTH * arena.mechanism(c.first).allowed
         if is_large and form.cosine <= SAME:
             found.append(form)
     return tuple(found)
+
+
+def _surely(field: Field, fit: Fitted, block: int, seed: int) -> float:
+    """Least size that a function surely has somewhere, or its deviation from its mean over the points: a constant may
+    be known less well than how it changes."""
+    at, mean, covariance, supported = _function(field, fit, block)
+    centred = at - at[supported].mean(axis=0)
+    sizes = [np.abs(a @ mean) - _band(a, covariance, supported, seed) for a in (at, centred)]
+    return max(float(x[supported].max(initial=0.0)) for x in sizes)
+
+
+def _function(field: Field, fit: Fitted, block: int) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Rows of a block's function at its points (k, n), its values (n,) with their covariance, and where data are."""
+    b = field.blocks[block]
+    basis, own = field.shapes[b.tag].basis, [fit.columns.index(c) for c in b.columns]
+    at = basis.at_points * field.sd[list(b.columns)]
+    return at, fit.mean[own], fit.covariance[np.ix_(own, own)], basis.supported
 
 
 def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitted) -> tuple[bool, float, str]:
@@ -189,18 +205,14 @@ def described(
     field: Field, found: Sets, gram: FloatArray, fit: Fitted, clear: Clear, channel: str, share: float, seed: int
 ) -> Remainder:  # fmt: skip
     """A mechanism of the best set as a function with its band, from a fit of that set."""
-    m, block = clear.first, field.blocks[clear.first]
-    s = field.shapes[block.tag]
-    own = [fit.columns.index(c) for c in block.columns]
-    at = s.basis.at_points * field.sd[list(block.columns)]
-    f = at @ fit.mean[own]
-    half = _band(at, fit.covariance[np.ix_(own, own)], s.basis.supported, seed)
-    f, half = (np.where(s.basis.supported, x, np.nan) for x in (f, half))
+    m, s = clear.first, field.shapes[field.blocks[clear.first].tag]
+    at, mean, covariance, supported = _function(field, fit, m)
+    f, half = (np.where(supported, x, np.nan) for x in (at @ mean, _band(at, covariance, supported, seed)))
     f, low, high = (s.mechanism.change(x) for x in (f, f - half, f + half))
     likely = [o for o, q in found.blocks.items() if field.blocks[o].kind == "shape" and q >= ALIKE * found.blocks[m]]
     over = [field.shapes[field.blocks[o].tag].coordinates for o in likely if field.mechanism(o) is s.mechanism]
     alike = sorted({n for c in over for n in c} - set(s.coordinates))
-    nearest, cosine = _nearest(field.blocks, gram, m, fit.mean[own])
+    nearest, cosine = _nearest(field.blocks, gram, m, mean)
     r = Remainder(
         channel, s.coordinates, share, math.nan, s.basis.points, f, low, high, tuple(alike), nearest, cosine,
         "", s.mechanism.name, s.mechanism.unit, clear.probability, s.manner,
