@@ -48,12 +48,15 @@ class Mechanism:
     def change(self, size: FloatArray) -> FloatArray:
         """Change of the effect's value that acts as this size of the response does; NaN where no value does.
 
-        They are the same, but for what acts as one over its value: twice the slip is half the slip slope.
+        They are the same, but for what acts as one over its value: twice the slip is half the slip slope. The response
+        is that to a step from the file's value, in units of that step.
         """
         effect = EFFECTS.get(self.source.partition("@")[0])
         if effect is None or not effect.drive.divides:
             return size
-        return 1.0 / np.where(size < 1.0, 1.0 - size, np.nan) - 1.0
+        first = effect.parameters[0]
+        left = 1.0 - size / (1.0 + first.step / first.neutral)
+        return 1.0 / np.where(left > 0.0, left, np.nan) - 1.0
 
 
 ALONG = ("t", "position")

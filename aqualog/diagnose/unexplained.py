@@ -26,8 +26,8 @@ __all__ = ["Clear", "clear_forms", "described", "unknown_forms"]
 
 AHEAD = 3.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
+NEEDED = 6.0  # [nats] that the best set loses, with their prior, without forms of which each explains less
 WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
-NEARLY_ALL = 0.995  # of a function's values, whose largest counts
 LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what is large, by the channel's unit
 ALIKE = 0.2  # share of the best one's probability from which the drive cannot distinguish another coordinate or axle
 _SLIPS = tuple(f"slip_{w}" for w in WHEELS)
@@ -73,31 +73,37 @@ def clear_forms(
     whole, counted = evidence(()), evidence(hidden)
     out = []
     for family in dict.fromkeys(field.name(own[0]) for own in clear):
-        needed = [(whole - evidence(own), own) for own in clear if field.name(own[0]) == family]
-        enough = [x for x in needed if x[0] >= PART * counted]
-        if not enough and whole - evidence([m for _, own in needed for m in own]) >= PART * counted:
-            enough = [max(needed)]
-        for loss, own in enough:
+        together = [own for own in clear if field.name(own[0]) == family]
+        lost = {own: whole - evidence(own) for own in together}
+        needed = [own for own in together if lost[own] >= PART * counted]
+        large = whole - evidence([m for own in together for m in own]) >= PART * counted
+        if not needed and large:
+            needed = [own for own in together if lost[own] + sum(blocks[m].log_prior for m in own) >= NEEDED]
+        # where the set does as well without any one of them, it is one of them
+        alike = [] if needed else [o[0] for o in together]
+        if not needed and large:
+            needed = [max(together, key=lambda own: lost[own])]
+        for own in needed:
             first = min(own, key=lambda m: evidence((m,)))
-            # beside others of its family that do as well without it, it is one of them
-            alike = 1 if loss >= PART * counted else len(needed)
-            probability, instead = _of_mechanism(field, found, first, [o[0] for _, o in needed] if alike > 1 else [])
-            out.append(Clear(own, first, tempered(probability / alike), instead, loss))
+            probability, instead = _of_mechanism(field, found, first, alike)
+            out.append(Clear(own, first, tempered(probability / max(len(alike), 1)), instead, lost[own]))
     return sorted(out, key=lambda c: -c.loss)
 
 
 def _of_mechanism(
     field: Field, found: Sets, block: int, alike: Sequence[int]
 ) -> tuple[float, tuple[Mechanism, ...]]:  # fmt: skip
-    """Share of the sets with a block's mechanism, and those of its family that other sets, or blocks `alike`, have."""
+    """Share of the sets with a block's mechanism, and those of its family that sets have instead of it; `alike`: of
+    these blocks of the best set each may be the one."""
     share, others = 0.0, {field.mechanism(m): math.inf for m in alike}
+    beside = {field.mechanism(m) for m in found.best if field.blocks[m].kind == "shape"} - others.keys()
     for (members, _), q in zip(found.sets, found.probability.tolist(), strict=True):
         family = [m for m in members if field.blocks[m].kind == "shape" and field.name(m) == field.name(block)]
         mechanisms = dict.fromkeys(map(field.mechanism, family))
         if field.mechanism(block) in mechanisms:
             share += q
         else:
-            others |= {m: others.get(m, 0.0) + q for m in mechanisms}
+            others |= {m: others.get(m, 0.0) + q for m in mechanisms if m not in beside}
     return share, tuple(m for m, q in others.items() if q >= ALIKE * share and m is not field.mechanism(block))
 
 
@@ -146,7 +152,7 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
 
     The share is of what the others of the set leave. Between axles and sides the reference velocity's noise, which is
     in the slip of all wheels, cancels. What the wheels do must show in their slip: a simulator's error in fast
-    movements is in other channels. A smooth function must explain some of the variance where it is half of its largest,
+    movements is in other channels. A smooth function must explain some of the variance where half of its energy is,
     too: else it is an offset in one kind of driving, as simulators have it when a car brakes to a stop.
     """
     channels = arena.parts[0].channels
@@ -161,7 +167,7 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
     share = _share(y, f, np.ones_like(f))
     rms = np.sqrt((f**2).mean(axis=1))
     if not any(arena.shapes[arena.blocks[m].tag].manner for m in members):
-        share = np.where(_share(y, f, np.abs(f) >= 0.5 * _most(f)) > 0.0, share, 0.0)
+        share = np.where(_share(y, f, np.abs(f) >= _most(f)) > 0.0, share, 0.0)
     large = [bool(r > LEAST[CHANNELS[c].unit] and s > WORTH_TELLING) for r, s, c in zip(rms, share, names, strict=True)]
     of_wheels = arena.mechanism(members[0]).name.startswith(("slip", "radius"))
     every = zip(large, share.tolist(), names, strict=True)
@@ -169,11 +175,11 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
 
 
 def _most(f: FloatArray) -> FloatArray:
-    """Largest size of each function (C, n) where it acts, without its highest 0.5 %. (C, 1)"""
-    size = np.abs(f)
-    acts = size > 1e-3 * size.max(axis=1, keepdims=True)
-    each = [np.quantile(x[a], NEARLY_ALL) if a.any() else 0.0 for x, a in zip(size, acts, strict=True)]
-    return np.array(each)[:, None]
+    """Size of each function (C, n) above which half of its energy is: where it acts, however seldom. (C, 1)"""
+    size = np.sort(np.abs(f), axis=1)
+    energy = np.cumsum(size**2, axis=1)
+    at = (energy < 0.5 * energy[:, -1:]).sum(axis=1, keepdims=True)
+    return np.asarray(np.take_along_axis(size, np.minimum(at, size.shape[1] - 1), axis=1))
 
 
 def _share(y: FloatArray, f: FloatArray, weight: BoolArray | FloatArray) -> FloatArray:
