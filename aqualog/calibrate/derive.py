@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Container, Mapping, Sequence
 from dataclasses import replace
 
 from aqualog.calibrate import words
@@ -16,7 +16,7 @@ from aqualog.core.vehicle import KEYS, WATER, Provenance, Vehicle, WaterNumber
 
 __all__ = [
     "FIXABLE", "GAIN_SD", "balance_parameters", "calibrated", "check_fixed", "contradicted", "derived", "estimates",
-    "identified_values", "keeping", "of_kept_mass", "rotating_share", "unbalanced_parameters",
+    "identified_values", "keeping", "rotating_share", "unbalanced_parameters",
 ]  # fmt: skip
 
 FIXABLE: Mapping[str, tuple[float, float]] = {
@@ -161,28 +161,17 @@ def contradicted(parameters: Sequence[Parameter], vehicle: Vehicle) -> list[Para
     ]  # fmt: skip
 
 
-def of_kept_mass(parameters: Sequence[Parameter], vehicle: Vehicle) -> tuple[Parameter, ...]:
-    """Return the parameters, the drag area with its interval for the file's mass where that one is to be kept.
+def keeping(parameters: Sequence[Parameter], odd: Container[str]) -> tuple[Parameter, ...]:
+    """Return the parameters, marked as kept those of these names, which contradict the vehicle file.
 
-    The drives show the ratio of drag area and mass, so both scale alike.
+    With a mass that is kept all of the balance is: drag area and rolling resistance are those of the drives' mass.
     """
-    mass = next((p for p in contradicted(parameters, vehicle) if p.name == "mass"), None)
-    if mass is None:
-        return tuple(parameters)
-    factor = vehicle.mass / mass.value
-    return tuple(_scaled(p, factor) if p.name == "drag_area" and p.ci95[0] < p.ci95[1] else p for p in parameters)
-
-
-def _scaled(p: Parameter, factor: float) -> Parameter:
-    low, high = p.ci95
-    remark = "; ".join(x for x in ("for the mass of the vehicle file", p.remark) if x)
-    return replace(p, value=factor * p.value, ci95=(factor * low, factor * high), remark=remark)
-
-
-def keeping(parameters: Sequence[Parameter], vehicle: Vehicle) -> tuple[Parameter, ...]:
-    """Return the parameters, with those marked as kept that contradict the vehicle file."""
-    kept = {p.name for p in contradicted(parameters, vehicle)}
-    return tuple(replace(p, kept=True, remark=words.kept(p)) if p.name in kept else p for p in parameters)
+    own = {"mass", "drag_area", "rolling_resistance"} if "mass" in odd else set()
+    along = {p.name for p in parameters if p.name in own and p.identified and p.remark != "given"}
+    return tuple(
+        replace(p, kept=True, remark=words.kept(p, alone=p.name in odd)) if p.name in odd or p.name in along else p
+        for p in parameters
+    )
 
 
 def identified_values(parameters: Sequence[Parameter], vehicle: Vehicle) -> dict[str, tuple[float, Parameter]]:
@@ -218,20 +207,20 @@ def _sd(key: str, value: float, p: Parameter, vehicle: Vehicle) -> float | None:
         mean = 0.5 * sum(uncertainty(vehicle, f"wheels.r_e_{axle}") for axle in "fr")
         share = 1.0 / (1.0 + p.value) / (p.value if key == "wheels.r_e_f" else 1.0)  # d ln r / d ratio
         sd = math.hypot(share * value * sd, mean)
-    elif p.value:  # of the gain that the file has already, and of a mass that is kept
+    elif p.value:  # of the gain that the file has already
         sd = math.sqrt(max(sd**2 - p.shared**2, 0.0)) * abs(value / p.value)
     return float(f"{sd:.3g}")
 
 
 def _provenances(
-    vehicle: Vehicle, values: Mapping[str, tuple[float, Parameter]], given: frozenset[str]
+    vehicle: Vehicle, values: Mapping[str, tuple[float, Parameter]], given: frozenset[str], kept: Collection[str]
 ) -> dict[str, Provenance]:
-    """Return where the values of a calibrated vehicle come from.
+    """Return where the values of a calibrated vehicle come from; those of keys that are kept, from where they did.
 
     What was fixed is measured, if the file does not say more of the same value. Without a given scale the mass rests on
     the torques: their gain stays a guess, but one that this mass binds.
     """
-    found = dict(vehicle.provenance)
+    found = {**{key: provenance_of(vehicle, key) for key in kept}, **vehicle.provenance}
     for key, (value, p) in values.items():
         if p.remark != "given":
             found[key] = Provenance("calibrated", _sd(key, value, p, vehicle))
@@ -274,6 +263,7 @@ def calibrated(
     # the gain's is that of the torques as they were read, like the gain itself
     scale = {"torque_gain": vehicle.torque_gain}
     seen = {n: float(f"{sd * scale.get(n, 1.0):.{DIGITS}g}") for n, sd in (spread or {}).items()}
-    tables = {"spread": {**vehicle.spread, **seen}, "provenance": _provenances(vehicle, values, given)}
+    kept = [_KEYS[p.name] for p in parameters if p.kept and p.name in _KEYS]
+    tables = {"spread": {**vehicle.spread, **seen}, "provenance": _provenances(vehicle, values, given, kept)}
     water = {**vehicle.water, **_water_numbers(parameters)}
     return replace(vehicle, **changed, **polynomials, **tables, water=water, given=given)  # type: ignore[arg-type]

@@ -137,7 +137,8 @@ def calibrate(
             hint="what was left out: " + "; ".join(f"{d.name}: {words.left_out(d.left_out)}" for d in all_drives),
         )  # fmt: skip
     radii = radius_parameters(usable, vehicle)
-    rolling = derive.calibrated(vehicle, radii if accept else derive.keeping(radii, vehicle))
+    odd_radii = derive.contradicted(radii, vehicle)
+    rolling = derive.calibrated(vehicle, radii if accept else derive.keeping(radii, {p.name for p in odd_radii}))
     usable = _by_lever(usable, vehicle, rolling)
     samples = [Sample(d.windows, energy_offset(d)) for d in usable]
     # without the driven axle the torques of the log need not be all of the drive
@@ -146,11 +147,13 @@ def calibrate(
         balance = _no_balance(usable, samples, fixed, vehicle, lacking)
     else:
         balance = _balance(usable, samples, fixed, vehicle, rolling)
-    fits, found, spread = balance.fits, balance.found, balance.spread
-    estimated = (*balance.parameters, *radii, *_offsets(fits, samples, balance.levels, fixed))
+    free, odd = balance, derive.contradicted(balance.parameters, vehicle)
     if not accept:
-        estimated = derive.of_kept_mass(estimated, vehicle)
-    parameters = estimated if accept else derive.keeping(estimated, vehicle)
+        balance, odd = _beside_kept(balance, usable, samples, fixed, vehicle, rolling)
+    odd += odd_radii
+    fits, found, spread = balance.fits, balance.found, free.spread
+    estimated = (*balance.parameters, *radii, *_offsets(fits, samples, balance.levels, fixed))
+    parameters = estimated if accept else derive.keeping(estimated, {p.name for p in odd})
     car = derive.calibrated(vehicle, parameters)
     scale = car.torque_gain / vehicle.torque_gain
     rods, missing = ({}, ()) if lacking else transfers(all_drives, car, torque_scale=scale)
@@ -158,14 +161,10 @@ def calibrate(
         f"{d.name}: hardly a stretch for the balance of forces" for d in all_drives if d.windows.v.size < LEAST_WINDOWS
     ]
     shown = {p.name for p in parameters if p.name in SPREAD and p.identified and p.name not in fixed}
-    # a drag area that is that of a kept mass differs from drive to drive in the same measure
-    scale_of = {p.name: p.value / found[p.name] for p in parameters if p.name == "drag_area" and p.name in shown}
-    differing = {
-        n: sd * scale_of.get(n, 1.0) for n, sd in one_more(spread, len(samples)).items() if n in shown and sd > 0.0
-    }
-    odd = words.contradictions(derive.contradicted(estimated, vehicle), found.get("torque_gain", 1.0), accepted=accept)
+    differing = {n: sd for n, sd in one_more(spread, len(samples)).items() if n in shown and sd > 0.0}
+    contradictions = words.contradictions(odd, free.found, accepted=accept)
     written = derive.identified_values(parameters, vehicle)
-    notes = (*odd, *words.notes(fits, samples, found, fixed, written, by_drive=spread.by_drive), *skipped)
+    notes = (*contradictions, *words.notes(fits, samples, found, fixed, written, by_drive=spread.by_drive), *skipped)
     return Calibration(
         vehicle.name, parameters, tuple(fits), fixed, words.cannot_tell(parameters, missing), notes, rods, differing
     )
@@ -206,6 +205,24 @@ def _balance(
     rotating = derive.rotating_share(rolling, found["mass_per_gain"])
     parameters = derive.balance_parameters(found, spread, fixed, vehicle, samples, rotating)
     return _Balanced(parameters, fits, found, spread, best.levels.tolist())
+
+
+def _beside_kept(
+    free: _Balanced, usable: Sequence[Drive], samples: Sequence[Sample], fixed: Mapping[str, float], vehicle: Vehicle,
+    rolling: Vehicle,
+) -> tuple[_Balanced, list[Parameter]]:  # fmt: skip
+    """The balance beside the values that the vehicle file keeps, and the estimates that contradict these.
+
+    What goes into the file must fit what stays in it. A rolling resistance is found anew with a drag area that is kept.
+    With another mass than that of the drives the balance fits nothing: the file keeps all of it.
+    """
+    balance, odd = free, derive.contradicted(free.parameters, vehicle)
+    while (new := derive.contradicted(balance.parameters, vehicle)) and "mass" not in {p.name for p in odd}:
+        fixed = {**fixed, **{p.name: p.file_value for p in new}}
+        balance = _balance(usable, samples, fixed, vehicle, rolling)
+        odd += [p for p in derive.contradicted(balance.parameters, vehicle) if p.name not in fixed]
+    own = {p.name: p for p in odd}
+    return balance._replace(parameters=[own.get(p.name, p) for p in balance.parameters]), odd
 
 
 def _no_balance(

@@ -57,20 +57,23 @@ def outside(key: Key) -> str:
     return f"the estimate is outside {key.low:g} to {key.high:g} {key.unit}: check units and signs of torque and a_x"
 
 
-def kept(p: Parameter) -> str:
-    """Say that the vehicle file's value stays, and what the interval rests on."""
-    return "; ".join(x for x in ("the vehicle file's value is kept", p.remark) if x)
+def kept(p: Parameter, *, alone: bool) -> str:
+    """Say that the vehicle file's value stays, by itself or with its mass, and what the interval rests on."""
+    why = "the vehicle file's value is kept" + (
+        "" if alone else " with its mass: the estimate is that of the drives' mass"
+    )
+    return "; ".join(x for x in (why, p.remark) if x)
 
 
-def contradictions(found: Sequence[Parameter], gain: float, *, accepted: bool) -> list[str]:
+def contradictions(found: Sequence[Parameter], free: Mapping[str, float], *, accepted: bool) -> list[str]:
     """Say which values of the vehicle file the drives contradict, and what to do.
 
     Parameters
     ----------
     found : sequence of Parameter
         Whose interval excludes the file's value.
-    gain : float
-        Torque gain by which the mass was found. [-]
+    free : mapping
+        Values that the drives show with nothing kept, by name.
     accepted : bool
         Whether the estimates are written in place of the file's values.
     """
@@ -87,11 +90,13 @@ def contradictions(found: Sequence[Parameter], gain: float, *, accepted: bool) -
         elif p.name == "mass":
             said.append(
                 f"{text}: the file's value is kept. If the car was weighed, the torques are wrong: --fix "
-                f"mass={p.file_value:.5g} gives a torque gain of {gain * p.file_value / p.value:.3f}. If not, --accept "
-                "takes the drives' values"
+                f"mass={p.file_value:.5g} gives a torque gain of {free['torque_gain'] * p.file_value / p.value:.3f}. "
+                "If not, --accept takes the drives' values. Until then, drag area and rolling resistance are kept too"
             )
         else:
-            said.append(f"{text}: the file's value is kept; --accept takes the drives' values")
+            taken, *_ = same_decimals(free.get(p.name, p.value), p.ci95)
+            beside = "" if taken == value else f" beside the values that are kept; alone they show {taken}"
+            said.append(f"{text}{beside}: the file's value is kept; --accept takes {taken}")
     return said
 
 

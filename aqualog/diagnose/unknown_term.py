@@ -88,14 +88,14 @@ def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = 
     how = r.manner or f"goes with {' and '.join(map(_title, r.depends_on))}"
     text = f"Unexplained: {mechanism.title} {how} (probability {r.probability:.2f}"
     text += f"; {r.share:.0%} of the variance of the {title}"
-    sure = np.isfinite(r.f) & ((r.low > 0.0) | (r.high < 0.0))
+    sure = np.isfinite(r.high) & ((r.low > 0.0) | (r.high < 0.0))  # a band without an end says no size
     if sure.any():
         at = int(np.argmax(np.where(sure, np.abs(r.f), -1.0)))
         there = ", ".join(f"{v:.4g} {COORDINATES[n].unit}" for n, v in zip(r.depends_on, r.x[at], strict=True))
         text += f"; {quantity(float(r.f[at]), mechanism.unit, change=True)} at {there}"
     text += ")."
-    if alike := [*(m.title for m in instead), *map(_title, r.proxies)]:
-        text += f" It cannot be distinguished from {listed(alike)} here."
+    for alike in ([m.title for m in instead], [f"one that goes with {_title(n)}" for n in r.proxies]):
+        text += f" It cannot be distinguished from {listed(alike)} here." if alike else ""
     # what comes again at equal ways does not at equal times, unless the speed never changes: then both are likely
     if {"t", "position"} & set(r.depends_on) and not r.manner.startswith(("in waves", "for ")):
         text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."

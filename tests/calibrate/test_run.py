@@ -15,6 +15,7 @@ from aqualog.calibrate.run import calibrate
 from aqualog.calibrate.words import notes
 from aqualog.config.vehicle import calibrated_toml, load_vehicle
 from aqualog.core.errors import FitError, SignalError
+from aqualog.core.provenance import provenance_of
 from aqualog.core.records import Quality, Signals
 from aqualog.core.vehicle import Provenance, Vehicle
 from aqualog.features.smoothing import earlier
@@ -269,7 +270,10 @@ def test_a_weighed_mass_that_the_drives_contradict_stays_unless_accepted(series)
     car, other = (calibrated(light, r.parameters) for r in (kept, taken))
     assert car.mass == light.mass
     assert other.mass == pytest.approx(p.value, rel=1e-6)
-    assert car.drag_area / car.mass == pytest.approx(other.drag_area / other.mass, rel=1e-6)
+    # the balance fits no car of another mass: all of it stays, and says where it comes from although drives differ
+    assert (car.drag_area, car.rolling_resistance) == (light.drag_area, light.rolling_resistance)
+    assert other.drag_area == pytest.approx(taken.get("drag_area").value, rel=1e-6)
+    assert {provenance_of(car, key).source for key in ("mass", "drag_area")} == {"data_sheet", "guess"}
     assert f"mass = {light.mass!r}" in calibrated_toml(light, kept)
     assert "kept, the drives show" in calibrated_toml(light, kept)
 
@@ -293,18 +297,23 @@ def test_what_is_not_given_or_fixed_is_no_contradiction(series):
     assert not any(p.kept for p in calibrate(signals, ["a", "b"], given, {"mass": true.mass}).parameters)
 
 
-def test_the_drag_area_of_a_kept_mass_has_an_interval_of_its_own(series, tmp_path):
-    """The file's drag area is that of the file's mass: value, interval and spread scale alike, everywhere."""
+def test_beside_a_kept_drag_area_the_rolling_resistance_is_found_anew(series):
+    """A file must fit its own drives: a rolling resistance that was found with another drag area does not."""
     signals, true, _, plain = series
-    light = replace(believed(true), mass=plain.get("mass").value - 300.0, given=frozenset({"drivetrain", "mass"}))
-    kept, taken = (calibrate(signals, ["a", "b"], light, accept=accept).get("drag_area") for accept in (False, True))
-    factor = light.mass / plain.get("mass").value
-    assert kept.value == pytest.approx(factor * taken.value, rel=1e-3)
-    assert kept.ci95 == pytest.approx([factor * x for x in taken.ci95], rel=1e-3)
-    result = calibrate(signals, ["a", "b"], light)
-    (line,) = (x for x in calibrated_toml(light, result).splitlines() if x.startswith("drag_area") and "95 %" in x)
-    assert f"95 %: {kept.ci95[0]:.2f} ... {kept.ci95[1]:.2f}" in line
-    assert f"drag_area = {kept.value:.7g}" in line
+    mass = plain.get("mass").value
+    odd = replace(believed(true), drag_area=3.0 * true.drag_area, given=frozenset({"drivetrain", "drag_area"}))
+    kept = calibrate(signals, ["a", "b"], odd, {"mass": mass})
+    beside = calibrate(signals, ["a", "b"], odd, {"mass": mass, "drag_area": odd.drag_area})
+    assert kept.get("drag_area").kept
+    car = calibrated(odd, kept.parameters)
+    assert car.drag_area == odd.drag_area
+    for name in ("rolling_resistance", "torque_gain"):
+        assert kept.get(name).value == pytest.approx(beside.get(name).value, rel=1e-9)
+    assert abs(car.rolling_resistance / plain.get("rolling_resistance").value - 1.0) > 0.05
+    assert [d.rmse_after for d in kept.drives] == [d.rmse_after for d in beside.drives]
+    accepted = calibrate(signals, ["a", "b"], odd, {"mass": mass}, accept=True).get("drag_area").value
+    (note,) = (n for n in kept.notes if "the vehicle file says drag_area" in n)
+    assert f"--accept takes {accepted:.2f}" in note
 
 
 def test_a_torque_gain_that_is_not_identified_is_not_said_to_be_written(series):

@@ -296,8 +296,8 @@ def slipping(seed, hidden, drivetrain="awd", turned=None):
     return arena_of(make_evidence([drive], asked, [y], [[x[None] / 1.1 for x in made.values()]], Model()), [])
 
 
-def saddle(c):
-    return -0.8 * np.exp(-(((c["torque"] - 250.0) / 40.0) ** 2))
+def saddle(c, width=40.0):
+    return -0.8 * np.exp(-(((c["torque"] - 250.0) / width) ** 2))
 
 
 @pytest.mark.parametrize("drivetrain", ["awd", "rwd"])
@@ -310,9 +310,15 @@ def test_a_slip_of_all_wheels_is_one_form(drivetrain):
     assert {r.mechanism for r in found} == ({"slip_all"} if drivetrain == "awd" else {"slip_f", "slip_r"})
     assert {r.depends_on for r in found} == {("torque",)}
     assert ("all driven wheels" in found[0].sentence) == (drivetrain == "awd")
-    # the slip is 1.8 times the file's, so its slope is 1/1.8 of the file's
-    if drivetrain == "awd":
-        assert np.nanmin(found[0].f) == pytest.approx(1.0 / 1.8 - 1.0, abs=0.08)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_slip_slope_is_stated_as_its_change(seed):
+    """The slip is 1.8 times the file's, so its slope is 1/1.8 of the file's."""
+    (r,) = unknown_forms(a := slipping(seed, {None: lambda c: saddle(c, 100.0)}), compete(a), seed=1)
+    at = int(np.nanargmin(np.abs(r.x[:, 0] - 250.0)))
+    assert r.f[at] == pytest.approx(1.0 / 1.8 - 1.0, abs=0.04)
+    assert r.low[at] < 1.0 / 1.8 - 1.0 < r.high[at]
 
 
 def test_two_forms_of_two_axles_are_two():
