@@ -105,12 +105,6 @@ class Hypothesis:
     def _own_tolerance(self) -> float | None:
         return self.room or self.effect.drive.tolerance_at.get(self.where or "", self.effect.drive.tolerance)
 
-    def step(self, name: str) -> float:
-        """Step of the finite difference: of the order that is expected, toward the side that has more room."""
-        p = self.parameter(name)
-        size = 0.5 * p.sigma
-        return size if p.high - p.neutral >= size else -size
-
 
 def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis, ...], dict[str, str]]:
     """All hypotheses that these logs can test, and the reason why others cannot be tested, by name.
@@ -279,7 +273,7 @@ def signatures(
             return residual(drive, changed, step=step_s, like=led if step_s == ROUGH_S else None)
 
         for name in h.free:
-            at, step = value_in(model, h, name), h.step(name)
+            at, step = value_in(model, h, name), h.parameter(name).step
             if h.effect.drive.is_shift:
                 # noise of an input, shifted one way only, would correlate with itself in the residual
                 p = h.parameter(name)

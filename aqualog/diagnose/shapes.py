@@ -48,32 +48,47 @@ class Mechanism:
     def change(self, size: FloatArray) -> FloatArray:
         """Change of the effect's value that acts as this size of the response does; NaN where no value does.
 
-        They are the same, but for what acts as one over its value: twice the slip is half the slip slope.
+        They are the same, but for what acts as one over its value: twice the slip is half the slip slope. The response
+        is that to a step from the file's value, in units of that step.
         """
         effect = EFFECTS.get(self.source.partition("@")[0])
         if effect is None or not effect.drive.divides:
             return size
-        return 1.0 / np.where(size < 1.0, 1.0 - size, np.nan) - 1.0
+        first = effect.parameters[0]
+        left = 1.0 - size / (1.0 + first.step / first.neutral)
+        return 1.0 / np.where(left > 0.0, left, np.nan) - 1.0
 
 
 ALONG = ("t", "position")
-_CAR = (("v_x",), ("torque",), ("a_y",), ("yaw_rate",), ("steer_angle",), ("since_braking",), ("water_depth",),
-        ("ambient_temperature",), ("position",), ("t",), ("v_x", "torque"), ("v_x", "water_depth"))  # fmt: skip
-_SENSOR = (("v_x",), ("a_x",), ("t",), ("ambient_temperature",))
-_SLIP = (("torque",), ("v_x",), ("t",), ("a_y",), ("yaw_rate",), ("since_braking",), ("water_depth",))
+_STATE = (
+    "v_x", "torque", "a_x", "a_y", "yaw_rate", "steer_angle", "since_braking", "water_depth", "ambient_temperature",
+)  # fmt: skip
+
+
+def _over(*more: str | tuple[str, str], without: str = "") -> tuple[tuple[str, ...], ...]:
+    """Each coordinate of the driving state alone, without some, and others."""
+    state = tuple((n,) for n in _STATE if n not in without.split())
+    return (*state, *((n,) if isinstance(n, str) else n for n in more))
+
+
+_SLIP = _over("t", without="steer_angle ambient_temperature a_x")
+_RADIUS = _over("t", without="steer_angle a_x water_depth")
 MECHANISMS: tuple[Mechanism, ...] = (
-    Mechanism("force", "a force on the car", "unit_force", "N", 150.0, 7.5, _CAR),
+    Mechanism(
+        "force", "a force on the car", "unit_force", "N", 150.0, 7.5,
+        _over("position", "t", ("v_x", "torque"), ("v_x", "water_depth")),
+    ),
     Mechanism(
         "accelerometer", "an offset of the accelerometer", "accelerometer_bias@a_x", "m/s^2", 0.15, 0.005,
-        _SENSOR,
+        _over("t", without="steer_angle water_depth"),
     ),
     Mechanism(
         "accelerometer_gain", "the gain of the accelerometer", "accelerometer_gain@a_x", "-", 0.05, 0.005,
-        _SENSOR, is_fast=True, scales="a_x",
+        _over("t", without="steer_angle water_depth since_braking"), is_fast=True, scales="a_x",
     ),
     Mechanism(
         "torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.005,
-        (("torque",), ("v_x",), ("t",)), is_fast=True,
+        _over("t", without="a_x steer_angle water_depth"), is_fast=True,
     ),
     Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.035, _SLIP, is_fast=True,
               family="slip"),
@@ -81,23 +96,17 @@ MECHANISMS: tuple[Mechanism, ...] = (
               family="slip"),
     Mechanism(
         "slip_all", "the slip slope of all driven wheels", "slip_stiffness", "-", 0.3, 0.035,
-        (("torque",), ("v_x",), ("a_y",), ("yaw_rate",), ("since_braking",)), family="slip",
+        _over(without="steer_angle ambient_temperature a_x water_depth"), family="slip",
     ),
-    Mechanism(
-        "radius_f", "the radius of the front wheels", "tyre_radius@f", "-", 0.005, 0.00035,
-        (("v_x",), ("t",), ("torque",)),
-    ),
-    Mechanism(
-        "radius_r", "the radius of the rear wheels", "tyre_radius@r", "-", 0.005, 0.00035,
-        (("v_x",), ("t",), ("torque",)),
-    ),
+    Mechanism("radius_f", "the radius of the front wheels", "tyre_radius@f", "-", 0.005, 0.00035, _RADIUS),
+    Mechanism("radius_r", "the radius of the rear wheels", "tyre_radius@r", "-", 0.005, 0.00035, _RADIUS),
     Mechanism(
         "velocity", "the scale of the reference velocity", "velocity_scale@v_x", "-", 0.01, 0.0005,
-        (("v_x",), ("t",)),
+        _over("position", "t", without="steer_angle"),
     ),
     Mechanism(
         "lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.05,
-        (("v_x",),),
+        _over(without="water_depth since_braking"),
     ),
     Mechanism(
         "bank", "the bank of the road", "accelerometer_bias@a_y", "m/s^2", 0.2, 0.0, (("position",), ("t",)),

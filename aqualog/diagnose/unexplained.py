@@ -26,8 +26,8 @@ __all__ = ["Clear", "clear_forms", "described", "unknown_forms"]
 
 AHEAD = 3.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
+NEEDED = 6.0  # [nats] that the best set loses, with their prior, without forms of which each explains less
 WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
-NEARLY_ALL = 0.995  # of a function's values, whose largest counts
 LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what is large, by the channel's unit
 ALIKE = 0.2  # share of the best one's probability from which the drive cannot distinguish another coordinate or axle
 _SLIPS = tuple(f"slip_{w}" for w in WHEELS)
@@ -73,31 +73,37 @@ def clear_forms(
     whole, counted = evidence(()), evidence(hidden)
     out = []
     for family in dict.fromkeys(field.name(own[0]) for own in clear):
-        needed = [(whole - evidence(own), own) for own in clear if field.name(own[0]) == family]
-        enough = [x for x in needed if x[0] >= PART * counted]
-        if not enough and whole - evidence([m for _, own in needed for m in own]) >= PART * counted:
-            enough = [max(needed)]
-        for loss, own in enough:
+        together = [own for own in clear if field.name(own[0]) == family]
+        lost = {own: whole - evidence(own) for own in together}
+        needed = [own for own in together if lost[own] >= PART * counted]
+        large = whole - evidence([m for own in together for m in own]) >= PART * counted
+        if not needed and large:
+            needed = [own for own in together if lost[own] + sum(blocks[m].log_prior for m in own) >= NEEDED]
+        # where the set does as well without any one of them, it is one of them
+        alike = [] if needed else [o[0] for o in together]
+        if not needed and large:
+            needed = [max(together, key=lambda own: lost[own])]
+        for own in needed:
             first = min(own, key=lambda m: evidence((m,)))
-            # beside others of its family that do as well without it, it is one of them
-            alike = 1 if loss >= PART * counted else len(needed)
-            probability, instead = _of_mechanism(field, found, first, [o[0] for _, o in needed] if alike > 1 else [])
-            out.append(Clear(own, first, tempered(probability / alike), instead, loss))
+            probability, instead = _of_mechanism(field, found, first, alike)
+            out.append(Clear(own, first, tempered(probability / max(len(alike), 1)), instead, lost[own]))
     return sorted(out, key=lambda c: -c.loss)
 
 
 def _of_mechanism(
     field: Field, found: Sets, block: int, alike: Sequence[int]
 ) -> tuple[float, tuple[Mechanism, ...]]:  # fmt: skip
-    """Share of the sets with a block's mechanism, and those of its family that other sets, or blocks `alike`, have."""
+    """Share of the sets with a block's mechanism, and those of its family that sets have instead of it; `alike`: of
+    these blocks of the best set each may be the one."""
     share, others = 0.0, {field.mechanism(m): math.inf for m in alike}
+    beside = {field.mechanism(m) for m in found.best if field.blocks[m].kind == "shape"} - others.keys()
     for (members, _), q in zip(found.sets, found.probability.tolist(), strict=True):
         family = [m for m in members if field.blocks[m].kind == "shape" and field.name(m) == field.name(block)]
         mechanisms = dict.fromkeys(map(field.mechanism, family))
         if field.mechanism(block) in mechanisms:
             share += q
         else:
-            others |= {m: others.get(m, 0.0) + q for m in mechanisms}
+            others |= {m: others.get(m, 0.0) + q for m in mechanisms if m not in beside}
     return share, tuple(m for m, q in others.items() if q >= ALIKE * share and m is not field.mechanism(block))
 
 
@@ -118,11 +124,27 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     for c in clear_forms(arena, posterior, posterior.tolerant, lambda own: where(own)[1] > WORTH_TELLING):
         is_large, share, channel = where(c.own)
         form = described(arena, posterior, posterior.gram, fit, c, channel, share, seed)
-        usual = WORTH * arena.mechanism(c.first).allowed
-        is_large |= not form.manner and bool(np.nan_to_num(np.maximum(form.low, -form.high)).max() >= usual)
+        is_large |= not form.manner and _surely(arena, fit, c.first, seed) >= WORTH * arena.mechanism(c.first).allowed
         if is_large and form.cosine <= SAME:
             found.append(form)
     return tuple(found)
+
+
+def _surely(field: Field, fit: Fitted, block: int, seed: int) -> float:
+    """Least size that a function surely has somewhere, or its deviation from its mean over the points: a constant may
+    be known less well than how it changes."""
+    at, mean, covariance, supported = _function(field, fit, block)
+    centred = at - at[supported].mean(axis=0)
+    sizes = [np.abs(a @ mean) - _band(a, covariance, supported, seed) for a in (at, centred)]
+    return max(float(x[supported].max(initial=0.0)) for x in sizes)
+
+
+def _function(field: Field, fit: Fitted, block: int) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Rows of a block's function at its points (k, n), its values (n,) with their covariance, and where data are."""
+    b = field.blocks[block]
+    basis, own = field.shapes[b.tag].basis, [fit.columns.index(c) for c in b.columns]
+    at = basis.at_points * field.sd[list(b.columns)]
+    return at, fit.mean[own], fit.covariance[np.ix_(own, own)], basis.supported
 
 
 def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitted) -> tuple[bool, float, str]:
@@ -130,7 +152,7 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
 
     The share is of what the others of the set leave. Between axles and sides the reference velocity's noise, which is
     in the slip of all wheels, cancels. What the wheels do must show in their slip: a simulator's error in fast
-    movements is in other channels. A smooth function must explain some of the variance where it is half of its largest,
+    movements is in other channels. A smooth function must explain some of the variance where half of its energy is,
     too: else it is an offset in one kind of driving, as simulators have it when a car brakes to a stop.
     """
     channels = arena.parts[0].channels
@@ -145,7 +167,7 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
     share = _share(y, f, np.ones_like(f))
     rms = np.sqrt((f**2).mean(axis=1))
     if not any(arena.shapes[arena.blocks[m].tag].manner for m in members):
-        share = np.where(_share(y, f, np.abs(f) >= 0.5 * _most(f)) > 0.0, share, 0.0)
+        share = np.where(_share(y, f, np.abs(f) >= _most(f)) > 0.0, share, 0.0)
     large = [bool(r > LEAST[CHANNELS[c].unit] and s > WORTH_TELLING) for r, s, c in zip(rms, share, names, strict=True)]
     of_wheels = arena.mechanism(members[0]).name.startswith(("slip", "radius"))
     every = zip(large, share.tolist(), names, strict=True)
@@ -153,11 +175,11 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
 
 
 def _most(f: FloatArray) -> FloatArray:
-    """Largest size of each function (C, n) where it acts, without its highest 0.5 %. (C, 1)"""
-    size = np.abs(f)
-    acts = size > 1e-3 * size.max(axis=1, keepdims=True)
-    each = [np.quantile(x[a], NEARLY_ALL) if a.any() else 0.0 for x, a in zip(size, acts, strict=True)]
-    return np.array(each)[:, None]
+    """Size of each function (C, n) above which half of its energy is: where it acts, however seldom. (C, 1)"""
+    size = np.sort(np.abs(f), axis=1)
+    energy = np.cumsum(size**2, axis=1)
+    at = (energy < 0.5 * energy[:, -1:]).sum(axis=1, keepdims=True)
+    return np.asarray(np.take_along_axis(size, np.minimum(at, size.shape[1] - 1), axis=1))
 
 
 def _share(y: FloatArray, f: FloatArray, weight: BoolArray | FloatArray) -> FloatArray:
@@ -189,18 +211,14 @@ def described(
     field: Field, found: Sets, gram: FloatArray, fit: Fitted, clear: Clear, channel: str, share: float, seed: int
 ) -> Remainder:  # fmt: skip
     """A mechanism of the best set as a function with its band, from a fit of that set."""
-    m, block = clear.first, field.blocks[clear.first]
-    s = field.shapes[block.tag]
-    own = [fit.columns.index(c) for c in block.columns]
-    at = s.basis.at_points * field.sd[list(block.columns)]
-    f = at @ fit.mean[own]
-    half = _band(at, fit.covariance[np.ix_(own, own)], s.basis.supported, seed)
-    f, half = (np.where(s.basis.supported, x, np.nan) for x in (f, half))
+    m, s = clear.first, field.shapes[field.blocks[clear.first].tag]
+    at, mean, covariance, supported = _function(field, fit, m)
+    f, half = (np.where(supported, x, np.nan) for x in (at @ mean, _band(at, covariance, supported, seed)))
     f, low, high = (s.mechanism.change(x) for x in (f, f - half, f + half))
     likely = [o for o, q in found.blocks.items() if field.blocks[o].kind == "shape" and q >= ALIKE * found.blocks[m]]
     over = [field.shapes[field.blocks[o].tag].coordinates for o in likely if field.mechanism(o) is s.mechanism]
     alike = sorted({n for c in over for n in c} - set(s.coordinates))
-    nearest, cosine = _nearest(field.blocks, gram, m, fit.mean[own])
+    nearest, cosine = _nearest(field.blocks, gram, m, mean)
     r = Remainder(
         channel, s.coordinates, share, math.nan, s.basis.points, f, low, high, tuple(alike), nearest, cosine,
         "", s.mechanism.name, s.mechanism.unit, clear.probability, s.manner,

@@ -135,6 +135,12 @@ class Parameter:
     meaning: str
     day_to_day: DayToDay | None = None
 
+    @property
+    def step(self) -> float:
+        """Step of finite differences: of the order that is expected, toward the side that has more room."""
+        size = 0.5 * self.sigma
+        return size if self.high - self.neutral >= size else -size
+
 
 @dataclass(frozen=True, slots=True)
 class Table:

@@ -179,7 +179,7 @@ def test_kinds_are_the_contracts_and_forms_besides():
     assert set(known) == set(EFFECTS)
     assert not set(unknown) & set(EFFECTS)
     assert len(unknown) >= 10
-    assert len(HELD_BACK) == 5
+    assert len(HELD_BACK) == 6
     assert not set(HELD_BACK) & set(names_of(known=False))
     for name in known:
         for h in (draw(name, np.random.default_rng(s)) for s in range(6)):
@@ -204,7 +204,8 @@ def test_every_kind_changes_its_drive(name):
     late = {k: 4.0 for k in h.values if k == "start"}
     h = replace(h, values={**h.values, **late})
     off = replace(h, values={**h.values, **dict.fromkeys(KINDS[name].worth[h.where], KINDS[name].neutral)})
-    seconds, programme = (60.0, "city") if name in ("lingering_brake", "slate") else (12.0, KINDS[name].programmes[0])
+    brakes = "time since braking" in KINDS[name].depends_on
+    seconds, programme = (60.0, "city") if brakes else (12.0, KINDS[name].programmes[0])
     seen = clean_messages(programme, seconds, h), clean_messages(programme, seconds)
     none = clean_messages(programme, seconds, off)
     assert all(
@@ -216,11 +217,11 @@ def test_every_kind_changes_its_drive(name):
 
 
 def test_odd_forces_are_where_they_say():
-    def force(name, t=10.0, share=0.5, v=20.0, way=0.0, steer=0.0, torque=300.0, a_side=0.0, **values):
+    def force(name, t=10.0, share=0.5, v=20.0, way=0.0, steer=0.0, torque=300.0, a_side=0.0, yaw=0.0, **values):
         h = draw(name, np.random.default_rng(1))
         car, _ = car_of()
         setup = applied(Setup(car, NO_ODD, Place()), (replace(h, values={**h.values, **values}),))
-        return odd_force(t, share, v, way, steer, torque, a_side, setup.odd)
+        return odd_force(t, share, v, way, steer, torque, a_side, yaw, setup.odd)
 
     assert force("speed_hump", force=100.0, centre=20.0) == pytest.approx(100.0)
     assert force("passing_force", t=70.0, force=90.0, start=60.0, length=75.0) == pytest.approx(90.0)
@@ -234,18 +235,34 @@ def test_odd_forces_are_where_they_say():
     given = {"force": 90.0, "side": -1.0, "threshold": 0.8, "width": 0.1}
     at = [force("basalt", a_side=a, **given) for a in (-2.0, -0.8, 0.0, 2.0)]
     assert at == pytest.approx([90.0, 45.0, 0.0, 0.0], abs=1e-3)
+    at = [force("agate", yaw=y, force=50.0, knee=0.1) for y in (-0.1, 0.0, 0.4)]
+    assert at == pytest.approx([50.0 * np.tanh(1.0), 0.0, 50.0], abs=0.1)
+    given = {"force": 50.0, "start": 60.0, "length": 70.0}
+    at = [force("beryl", t=t, v=v, **given) for t, v in ((90.0, 30.0), (60.0, 20.0), (140.0, 20.0))]
+    assert at == pytest.approx([112.5, 25.0, 0.0], abs=1e-3)
 
 
 def test_odd_tyres_and_sensors_are_where_they_say():
     car = car_of()[0]
     band = Hidden("gneiss", None, {"depth": 0.4, "centre": 20.0, "width": 2.0})
     driven = [w for i, w in enumerate(WHEELS) if (car.split_rear if i > 1 else 1.0 - car.split_rear) > 0.0]
-    slope = []
-    for odd in (applied(Setup(car, NO_ODD, Place()), (band,)).odd, NO_ODD):
-        x = ride(car, np.linspace(10.0, 32.0, 1300), odd=odd)
-        stiff = np.mean([x[f"force_{w}"] / (x[f"load_{w}"] * x[f"slip_{w}"]) for w in driven], axis=0)
-        slope.append([np.median(stiff[np.abs(x["v_x"] - v) < 0.3]) for v in (13.0, 18.0, 20.0, 28.0)])
-    assert np.divide(*slope) == pytest.approx([1.0, 1.0 - 0.4 * np.exp(-0.5), 0.6, 1.0], rel=0.04)
+    wheel = Hidden("jasper", "fr", {"depth": 0.01, "side": 1.0, "threshold": 0.7, "width": 0.2})
+    odd = applied(Setup(car, NO_ODD, Place()), (wheel,)).odd
+    for lateral, by in ((2.0, 0.01), (-2.0, 0.0)):
+        one, two = (ride(car, steady(20.0), coast=True, lateral=lateral, odd=o) for o in (odd, NO_ODD))
+        turns = [one[f"omega_{w}"][-1] / two[f"omega_{w}"][-1] for w in ("fr", "rl")]
+        assert turns[0] / turns[1] - 1.0 == pytest.approx(by, abs=1e-3)
+    place = Hidden("galena", None, {"depth": 0.4, "period": 200.0, "phase": 0.0})
+    for hidden, by, at, near, expected in (
+        (band, "v_x", (13.0, 18.0, 20.0, 28.0), 0.3, [1.0, 1.0 - 0.4 * np.exp(-0.5), 0.6, 1.0]),
+        (place, "way", (50.0, 150.0), 2.0, [0.6, 1.0]),
+    ):
+        slope = []
+        for odd in (applied(Setup(car, NO_ODD, Place()), (hidden,)).odd, NO_ODD):
+            x = ride(car, np.linspace(10.0, 32.0, 1300), odd=odd)
+            stiff = np.mean([x[f"force_{w}"] / (x[f"load_{w}"] * x[f"slip_{w}"]) for w in driven], axis=0)
+            slope.append([np.median(stiff[np.abs(x[by] - here) < near]) for here in at])
+        assert np.divide(*slope) == pytest.approx(expected, rel=0.04)
 
     def seen(*hidden):
         return {s: x for m in clean_messages("country", 20.0, *hidden) for s, x in m.columns.items()}
@@ -266,6 +283,13 @@ def test_odd_tyres_and_sensors_are_where_they_say():
     assert all(np.abs(x[big[s]]).max(initial=0.0) < 0.01 for s, x in by.items())
     ratio = seen(Hidden("flint", "v_x", {"scale": 0.01, "period": 8.0, "phase": 0.0}))["v_x"] / true["v_x"]
     assert ratio[[200, 600, 1000]] == pytest.approx([1.01, 0.99, 1.01], abs=1e-4)
+    added = seen(Hidden("olivine", "a_y", {"lean": 0.2}))["a_y"] - true["a_y"]
+    pull = sum(x for s, x in true.items() if s.startswith("torque"))
+    assert added == pytest.approx(0.2e-3 * np.maximum(pull, 0.0), rel=0.02, abs=1e-4)
+    tilt = Hidden("zircon", None, {"angle": 0.01, "time": 9.0})
+    late, none = (clean_messages("city", 60.0, *h)[0].columns["a_x"] for h in ((tilt,), ()))
+    after = (late - none)[np.argmax(late - none) :]
+    assert after[[0, 200]] == pytest.approx(0.0981 * np.exp([0.0, -2.0 / 9.0]), rel=0.03)
 
 
 def test_points_are_a_form_as_a_diagnosis_has_it():

@@ -134,7 +134,7 @@ def test_the_step_goes_where_there_is_room():
     for effect in EFFECTS.values():
         h = Hypothesis(effect, None, (effect.parameters[0].name,))
         p = h.parameter(h.free[0])
-        assert p.low <= p.neutral + h.step(h.free[0]) <= p.high, effect.name
+        assert p.low <= p.neutral + p.step <= p.high, effect.name
 
 
 def test_tolerances_are_neutral_at_zero_and_change_something_else(drive):

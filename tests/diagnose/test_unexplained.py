@@ -292,7 +292,8 @@ def slipping(seed, hidden, drivetrain="awd", turned=None):
         vehicle=replace(KNOWN_CAR, drivetrain=drivetrain), dt=DT, used_s=0.1 * N, coordinates=own,
     )  # fmt: skip
     asked = tuple(hypothesis("slip_stiffness", w) for w in made)
-    return arena_of(make_evidence([drive], asked, [y], [[x[None] for x in made.values()]], Model()), [])
+    # what a step of 0.1 of the slope changes, by the step
+    return arena_of(make_evidence([drive], asked, [y], [[x[None] / 1.1 for x in made.values()]], Model()), [])
 
 
 def saddle(c):

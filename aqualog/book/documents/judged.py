@@ -107,7 +107,7 @@ DIAGNOSE = Document(
             several("depends_on", "signals that it is a function of; last, not in `x`, the one that a gain multiplies"),
             number("share", "-", "share of the residual's variance", null=True),
             number("p_value", "-", "probability by chance, of a campaign", null=True),
-            number("probability", "-", "probability of this mechanism, of a drive; `sentence` says what cannot be distinguished from it", null=True),
+            number("probability", "-", "probability of this mechanism itself, of a drive", null=True),
             several("x", "values of these signals, a row per point", several("", "", number("", "", "", null=True))),
             several("f", "the function there", number("", "as `unit` says", "", null=True)),
             several("low", "lower end of its band", number("", "as `unit` says", "", null=True)),

@@ -112,6 +112,11 @@ class Odd(NamedTuple):
     hum: np.ndarray = np.array([0.0, 20.0, 2.0])  # share of the slope, m/s, m/s
     stretch: np.ndarray = np.array([0.0, 700.0, 0.0])  # N at 20 m/s, m, rad
     soft: np.ndarray = np.array([0.0])  # share of the slope
+    agate: np.ndarray = np.array([0.0, 0.1])  # N, rad/s
+    beryl: np.ndarray = np.array([0.0, 60.0, 75.0])  # N at 20 m/s, s, s
+    galena: np.ndarray = np.array([0.0, 300.0, 0.0])  # share of the slope, m, rad
+    jasper: np.ndarray = np.array([0.0, 0.0, 1.0, 0.7, 0.2])  # relative, wheel, side of the bend, m/s^2, m/s^2
+    zircon: np.ndarray = np.array([0.0])  # rad
 
 
 NO_ODD = Odd()

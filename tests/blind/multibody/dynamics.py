@@ -44,7 +44,7 @@ def _bell(x, centre, width):
 
 
 @compiled
-def odd_force(t, share, v, way, steer, torque, a_side, odd):
+def odd_force(t, share, v, way, steer, torque, a_side, yaw, odd):
     """Forces against the motion that no effect has [N]; `share` of the drive that is over, `torque` of all shafts."""
     F = 0.0
     if odd.hump[0] != 0.0:
@@ -64,6 +64,10 @@ def odd_force(t, share, v, way, steer, torque, a_side, odd):
     if odd.stretch[0] != 0.0:  # by the square of speed, on two fifths of the way
         on = tanh(4.0 * sin(2.0 * pi * way / odd.stretch[1] + odd.stretch[2]) - 1.2)
         F += odd.stretch[0] * (v / 20.0) ** 2 * 0.5 * (1.0 + on)
+    F += odd.agate[0] * tanh(abs(yaw) / odd.agate[1])
+    if odd.beryl[0] != 0.0:
+        on = tanh(t - odd.beryl[1]) - tanh(t - odd.beryl[1] - odd.beryl[2])
+        F += odd.beryl[0] * (v / 20.0) ** 2 * 0.5 * on
     return F * tanh(v / 0.5)
 
 
@@ -120,11 +124,11 @@ def _driveline(y, f, aux, drive, gear, p):
 def _slope(i, t, y, aux, leak, lost, p, odd, linger):
     slope = p.slope[i] * load_factor(aux[LOAD + i], p.load_ref[i], p.load_law[i])
     slope *= exp(p.slope_drift[i] * t) * (1.0 + p.leak_slope[i] * leak) * (1.0 - lost) ** p.law[9]
-    return slope * odd_slope(i, aux[T_SHAFT + i], y[YAW], y[VX], linger, odd)
+    return slope * odd_slope(i, aux[T_SHAFT + i], y[YAW], y[VX], y[WAY], linger, odd)
 
 
 @compiled
-def odd_slope(i, torque, yaw, v, linger, odd):
+def odd_slope(i, torque, yaw, v, way, linger, odd):
     """Factor on the slope of wheel i that no effect has; `torque` of its shaft."""
     factor = 1.0 - odd.soft[0] * linger
     if odd.saddle[0] != 0.0:
@@ -133,6 +137,9 @@ def odd_slope(i, torque, yaw, v, linger, odd):
         factor *= 1.0 / (1.0 + odd.turning[0] * abs(yaw))
     if odd.hum[0] != 0.0:
         factor *= 1.0 - odd.hum[0] * _bell(v, odd.hum[1], odd.hum[2])
+    if odd.galena[0] != 0.0:  # patches of two lengths
+        x = 2.0 * pi * way / odd.galena[1] + odd.galena[2]
+        factor *= 1.0 - odd.galena[0] * 0.5 * (1.0 + tanh(6.0 * (sin(x) + sin(0.618 * x) - 0.3)))
     return factor
 
 
@@ -160,6 +167,9 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
         # belt, as the work of slip, rolling and water is all that may be lost between torque and road
         r_e = p.r_e[i] * (1.0 + p.growth[i] * u * u) * (1.0 - p.leak_radius[i] * leak)
         r_e -= 0.04 * (pressed - p.load_ref[i] / p.tyre_spring[i])
+        if odd.jasper[0] != 0.0 and i == int(odd.jasper[1]):
+            leans = (odd.jasper[2] * aux[A_Y] - odd.jasper[3]) / odd.jasper[4]
+            r_e *= 1.0 - odd.jasper[0] * 0.5 * (1.0 + tanh(leans))
         film = at(slow, FILM_L if i % 2 == 0 else FILM_R, way + (base if front else 0.0), COARSE)
         if not front and film > p.track_film:
             film = p.track_film + 0.05 * (film - p.track_film)
@@ -204,7 +214,7 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
     a_side = sum_y / p.mass
     resist += p.corner_drag * p.mass * a_side * a_side
     torque = aux[T_SHAFT] + aux[T_SHAFT + 1] + aux[T_SHAFT + 2] + aux[T_SHAFT + 3]
-    resist += odd_force(t, share, v, way, steer, torque, a_side, odd)
+    resist += odd_force(t, share, v, way, steer, torque, a_side, yaw, odd)
     a_x = (sum_x - resist) / (p.mass + p.towed)
     f[VX] = a_x - G * sin(grade) + yaw * v_y
     f[VY] = a_side - G * sin(bank) - yaw * v
@@ -220,7 +230,7 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
     for i in range(4):  # what the links carry loads the wheels at once
         down = p.anti * (tip / base * (0.5 if i < 2 else -0.5) + heel / p.track * (-0.5 if i % 2 == 0 else 0.5))
         f[ZU_RATE + i] -= down / p.unsprung[i]
-    aux[A_X] = a_x - G * y[PITCH]
+    aux[A_X] = a_x - G * (y[PITCH] - odd.zircon[0] * linger)
     aux[A_Y] = a_side + G * y[ROLL]
 
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from .car import gradients
 from .driver import ENGINE_HOLDS, MOTOR_HOLDS
 from .dynamics import G, odd_force, odd_slope
 from .hidden import KINDS, Setup
@@ -50,12 +51,12 @@ def _range(coordinate: str, drive: Sequence[Message]) -> tuple[float, float]:
 
 
 def _force(coordinate: str) -> Function:
-    at = {"t": 0.0, "share": 0.5, "v": 20.0, "way": 0.0, "steer": 0.0, "torque": 0.0, "a_side": 0.0}
+    at = {"t": 0.0, "share": 0.5, "v": 20.0, "way": 0.0, "steer": 0.0, "torque": 0.0, "a_side": 0.0, "yaw": 0.0}
     return lambda s, x, _: np.array([odd_force(*(at | {coordinate: y}).values(), s.odd) for y in x])
 
 
 def _slope(coordinate: str) -> Function:
-    at = {"torque": 0.0, "yaw": 0.0, "v": 20.0, "linger": 0.0}
+    at = {"torque": 0.0, "yaw": 0.0, "v": 20.0, "way": 0.0, "linger": 0.0}
     return lambda s, x, i: np.array([odd_slope(i, *(at | {coordinate: y}).values(), s.odd) - 1.0 for y in x])
 
 
@@ -81,7 +82,7 @@ def _read(s: Setup, total: np.ndarray) -> np.ndarray:
 
 
 FUNCTIONS: Mapping[str, Function] = {
-    "speed_hump": _force("v"), "steering_drag": _force("steer"), "basalt": _force("a_side"),
+    "speed_hump": _force("v"), "steering_drag": _force("steer"), "basalt": _force("a_side"), "agate": _force("yaw"),
     "odd_hours": lambda s, x, i: _force("share")(s, x / x[-1], i),
     "lingering_brake": lambda s, x, _: 2.0 * s.odd.linger[0] / s.car.r_e[2] * np.exp(-x / s.odd.linger[1]),
     "gneiss": _slope("v"), "yawing_slip": _slope("yaw"),
@@ -91,4 +92,7 @@ FUNCTIONS: Mapping[str, Function] = {
     "speed_dependent_gain": lambda s, x, _: misread(1.0, s.errors["a_x"], x) - 1.0,
     "feldspar": lambda s, x, _: misread(x, s.errors["a_x"], 15.0) - x,
     "dolomite": lambda s, x, _: misread(0.0, s.errors["a_y"], x),
+    "olivine": lambda s, x, _: misread(0.0, s.errors["a_y"], 15.0, x),
+    # less what the sensor takes for its own pitch
+    "zircon": lambda s, x, _: G * s.odd.zircon[0] * np.exp(-x / s.odd.linger[1]) / (1.0 + G * gradients(s.car)[0]),
 }  # fmt: skip

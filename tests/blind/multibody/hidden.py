@@ -155,7 +155,8 @@ def _skew(s: Setup, v: Values, where: str | None) -> Setup:
 
 
 def _odd(name: str, *parameters: str) -> Apply:
-    return lambda s, v, _: replace(s, odd=s.odd._replace(**{name: np.array([float(v[n]) for n in parameters])}))
+    return lambda s, v, where: replace(s, odd=s.odd._replace(**{name: np.array([
+        float(_AT[where][0] if n == "wheel" else v[n]) for n in parameters])}))  # fmt: skip
 
 
 def _payload(s: Setup, v: Values, where: str | None) -> Setup:
@@ -202,13 +203,9 @@ def _dead(s: Setup, v: Values, _: str | None) -> Setup:
     return s
 
 
-def _soft(s: Setup, v: Values, _: str | None) -> Setup:
-    return replace(s, odd=s.odd._replace(soft=np.array([v["depth"]]), linger=np.array([0.0, v["time"]])))
-
-
-def _ripple(s: Setup, v: Values, where: str | None) -> Setup:
-    values = np.array([v["torque"], float(_AT[where][0]), v["order"]])
-    return replace(s, odd=s.odd._replace(ripple=values))
+def _lingering(name: str, parameter: str) -> Apply:
+    return lambda s, v, _: replace(s, odd=s.odd._replace(**{
+        name: np.array([v[parameter]]), "linger": np.array([0.0, v["time"]])}))  # fmt: skip
 
 
 def _valley(s: Setup, v: Values, _: str | None) -> Setup:
@@ -316,7 +313,7 @@ _UNKNOWN = {
         _by("rate", all_=2.0), lambda s, v, _: replace(s, odd=s.odd._replace(turning=np.array([v["rate"]]))), "slip",
         ("yaw_rate",), programmes=("country", "city"), signs=1),
     "turn_ripple": _form(
-        {w: {"torque": 12.0} for w in WHEELS}, _ripple, "slip", ("angle",), signs=1,
+        {w: {"torque": 12.0} for w in WHEELS}, _odd("ripple", "torque", "wheel", "order"), "slip", ("angle",), signs=1,
         shape=lambda rng: {"order": float(rng.integers(1, 3))}),
     "lingering_brake": _form(
         _by("torque", all_=16.0), _odd("linger", "torque", "time"), "force_balance", ("time since braking",),
@@ -344,21 +341,42 @@ _UNKNOWN = {
             "side": float(rng.choice([-1, 1])), "threshold": rng.uniform(0.6, 0.9), "width": rng.uniform(0.1, 0.25)}),
     "quartz": _form(
         _by("force", all_=60.0), _odd("stretch", "force", "period", "phase"), "force_balance", ("position", "v_x"),
-        programmes=("country", "staircase"), signs=1, on_the_road=True, held_back=True,
+        programmes=("country", "staircase"), signs=1, on_the_road=True,
         shape=lambda rng: {"period": rng.uniform(450.0, 900.0), "phase": rng.uniform(0.0, 6.28)}),
     "mica": _form(
         _by("tip", a_x=0.015), _signal("a_x", lambda e, v: e._replace(tip=(v["tip"], v["threshold"]))), "accelerometer",
-        ("a_y",), programmes=("city", "country"), held_back=True, shape=lambda rng: {"threshold": rng.uniform(0.4, 0.8)}),
+        ("a_y",), programmes=("city", "country"), shape=lambda rng: {"threshold": rng.uniform(0.4, 0.8)}),
     "slate": _form(
-        _by("depth", all_=0.12), _soft, "slip", ("time since braking",), programmes=LIVELY, signs=1, held_back=True,
+        _by("depth", all_=0.12), _lingering("soft", "depth"), "slip", ("time since braking",), programmes=LIVELY, signs=1,
         shape=lambda rng: {"time": rng.uniform(16.0, 30.0)}),
     "chalk": _form(
-        _by("torque", all_=10.0), _dead, "force_balance", ("torque",), signs=1, held_back=True,
+        _by("torque", all_=10.0), _dead, "force_balance", ("torque",), signs=1,
         programmes=("city", "country", "staircase", "coast_down")),
     "flint": _form(
         _by("scale", v_x=0.0007), _signal("v_x", lambda e, w: e._replace(pulse=(w["scale"], w["period"], w["phase"]))),
-        "slip", ("time",), programmes=("country", "motorway", "staircase"), signs=1, held_back=True,
+        "slip", ("time",), programmes=("country", "motorway", "staircase"), signs=1,
         shape=lambda rng: {"period": rng.uniform(22.0, 40.0), "phase": rng.uniform(0.0, 6.28)}),
+    "agate": _form(
+        _by("force", all_=20.0), _odd("agate", "force", "knee"), "force_balance", ("yaw_rate",), programmes=("city", "country"),
+        signs=1, held_back=True, shape=lambda rng: {"knee": rng.uniform(0.06, 0.12)}),
+    "beryl": _form(
+        _by("force", all_=8.0), _odd("beryl", "force", "start", "length"), "force_balance", ("time", "v_x"),
+        programmes=("country", "motorway", "staircase", "coast_down"), held_back=True,
+        shape=lambda rng: {"start": rng.uniform(50.0, 120.0), "length": rng.uniform(60.0, 110.0)}),
+    "galena": _form(
+        _by("depth", all_=0.12), _odd("galena", "depth", "period", "phase"), "slip", ("position",), programmes=LIVELY, signs=1,
+        on_the_road=True, held_back=True,
+        shape=lambda rng: {"period": rng.uniform(250.0, 500.0), "phase": rng.uniform(0.0, 6.28)}),
+    "jasper": _form(
+        {w: {"depth": 8e-4} for w in WHEELS}, _odd("jasper", "depth", "wheel", "side", "threshold", "width"), "slip", ("a_y",),
+        programmes=("city", "country"), signs=1, held_back=True, shape=lambda rng: {
+            "side": float(rng.choice([-1, 1])), "threshold": rng.uniform(0.5, 0.8), "width": rng.uniform(0.15, 0.3)}),
+    "zircon": _form(
+        _by("angle", all_=0.0013), _lingering("zircon", "angle"), "accelerometer", ("time since braking",),
+        programmes=LIVELY, held_back=True, shape=lambda rng: {"time": rng.uniform(8.0, 18.0)}),
+    "olivine": _form(
+        _by("lean", a_y=0.04), _signal("a_y", lambda e, v: e._replace(lean=v["lean"])), "lateral", ("torque",),
+        programmes=("city", "country", "staircase"), held_back=True),
 }  # fmt: skip
 
 KINDS: Mapping[str, Kind] = {**_KNOWN, **_UNKNOWN}
