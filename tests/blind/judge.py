@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import shutil
 import sys
 from collections.abc import Sequence
@@ -100,7 +101,8 @@ def _line(c: Judged) -> dict[str, Any]:
         "unknown": c.unknown, "verdict": row.verdict, "said": [x.key for x in row.causes],
         "forms": [[f.mechanisms, sorted(f.depends_on), f.probability] for f in c.forms], "first_is_right": c.first_is_right,
         "right_or_twins": c.is_right_or_twins, "in_answer": c.in_answer, "wrong": c.wrong,
-        "form_is_right": c.form_is_right, "error": row.error,
+        "form_is_right": c.form_is_right,
+        "function_error": c.function_error if math.isfinite(c.function_error) else None, "error": row.error,
     }  # fmt: skip
 
 

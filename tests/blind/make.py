@@ -28,9 +28,12 @@ from tests.blind.metrics.plan import KNOWN
 from tests.blind.sealed import KINDS, seal
 from tests.blind.traces import detectability, residuals
 from tests.blind.world.cases import EXACT_PROGRAMMES, NOISES, Spec, clean_pair, clean_rows, make_case, truth, world_of
+from tests.blind.world.effects import Hidden
 from tests.blind.world.pools import COMPOUNDS, POOLS, SUITED
 from tests.blind.world.sensors import MEASURED, as_signals, measure
+from tests.blind.world.unknown import shape_of
 from tests.blind.world.vehicles import CARS
+from tests.blind.world.world import WHEELS
 
 __all__ = ["main", "write"]
 
@@ -114,12 +117,25 @@ def _truth(spec: Spec, kind: str, frame: pl.DataFrame) -> dict[str, Any]:
             mechanism, over, also = FORMS[h.effect]
             unknown = {
                 "mechanism": mechanism, "depends_on": over, "also": also, "kind": h.effect, "held_back": False,
-                "parameters": dict(h.values), "detectability": z,
+                "parameters": dict(h.values), "detectability": z, "points": _points(h, CARS[spec.vehicle], frame),
             }  # fmt: skip
         else:
             name = "road_grade" if h.effect == "hills" else h.effect
             effects.append({"effect": name, "where": h.where, "parameters": dict(h.values), "detectability": z})
     return {"kind": kind, "drive_type": spec.programme, "noise": spec.noise, "effects": effects, "unknown": unknown}
+
+
+def _points(h: Hidden, car: Vehicle, frame: pl.DataFrame) -> dict[str, Any] | None:
+    """The function of a form over one coordinate of a drive, as a diagnosis has it: a force against the motion, a gain."""
+    shape = shape_of(h, car)
+    if h.effect not in ("speed_hump", "gear_loss", "accelerometer_speed") or shape is None:
+        return None
+    columns = {"v_x": pl.col("v_x"), "torque": pl.sum_horizontal(f"torque_{w}" for w in WHEELS)}
+    at = frame.select(columns[shape.depends_on[0]]).to_series().to_numpy()
+    x = np.linspace(np.nanmin(at), np.nanmax(at), 100)
+    is_gain = len(shape.depends_on) > 1
+    f = shape.f(x, 1.0) if is_gain else -car.mass * shape.f(x)
+    return {"x": x.tolist(), "f": f.tolist(), "unit": "-" if is_gain else "N"}
 
 
 def _z(spec: Spec, frame: pl.DataFrame) -> float:

@@ -115,6 +115,27 @@ def test_unknown_form_needs_mechanism_and_coordinate():
     assert got["hump, held back"] == (6, 0.5)
 
 
+def test_function_of_a_right_form_is_compared_where_both_are_known():
+    def case(said, true, over="v_x"):
+        mechanism = said["mechanism"].partition("_")[0]
+        unknown = {"mechanism": mechanism, "depends_on": [over], "kind": "f", "held_back": False, "points": true}
+        return judged(document("unexplained", unexplained=[said]), truth("unknown", unknown=unknown))
+
+    true = {"x": [10.0, 20.0, 30.0], "f": [0.0, 100.0, 0.0], "unit": "N"}
+    said = {"unit": "N", "x": [[5.0], [15.0], [20.0], [25.0], [40.0]], "f": [900.0, 60.0, None, 40.0, 900.0]}
+    off, other = case({**form("force", "v_x"), **said}, true), case({**form("force", "t"), **said}, true)
+    assert (off.function_error, other.function_error) == (pytest.approx(0.2), pytest.approx(math.nan, nan_ok=True))
+    rear = {**true, "unit": "-", "slip_r": [10.0, 110.0, 10.0]}
+    axle = case({**form("slip_r", "v_x"), **said, "unit": "-"}, rear)
+    assert axle.function_error == pytest.approx(math.hypot(0.0, 20.0) / math.hypot(60.0, 60.0))
+    offset = {"x": [-1.0, 0.0, 1.0, 2.0], "f": [0.1, 0.0, 0.1, 0.4], "unit": "m/s^2"}
+    gain = {**form("accelerometer_gain", "a_x"), "unit": "-", "x": [[-1.0], [1.0], [2.0]], "f": [-0.1, 0.1, 0.2]}
+    assert case(gain, offset, "a_x").function_error == pytest.approx(0.0, abs=1e-12)
+    got = measured([off, other, axle])
+    assert got["function error of right forms, median"] == (2, pytest.approx(0.5 * (0.2 + axle.function_error)))
+    assert got["function error of right forms at most 15 %"] == (2, 0.0)
+
+
 def test_form_that_the_library_has_under_a_name_may_be_named():
     unknown = {"mechanism": "kinematic", "depends_on": ["position"], "kind": "rolling_road", "held_back": False}
     hidden = truth("unknown", unknown={**unknown, "accepts": ["road_grade", "unexplained_grade"]})

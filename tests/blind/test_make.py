@@ -72,6 +72,9 @@ def test_magic_case_of_a_form_says_how_it_acts():
     assert frame.height == held.height == 2000
     assert (truth["unknown"]["mechanism"], truth["unknown"]["depends_on"]) == ("force", ["v_x"])
     assert truth["effects"] == []
+    points, bump = truth["unknown"]["points"], truth["unknown"]["parameters"]
+    away = (np.array(points["x"]) - bump["centre"]) / bump["width"]
+    assert (points["unit"], points["f"]) == ("N", pytest.approx(bump["force"] * np.exp(-0.5 * away**2)))
     assert vehicle.mass > 0.0
     assert set(UNKNOWN) == {*make.FORMS, "hills"}
 

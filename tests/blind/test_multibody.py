@@ -15,6 +15,7 @@ from tests.blind.multibody.car import NO_ODD, draw_car, gradients, vehicle_file
 from tests.blind.multibody.cases import DT, draw_plan, make_case, residuals
 from tests.blind.multibody.driver import ROWS, drive_along
 from tests.blind.multibody.dynamics import odd_force
+from tests.blind.multibody.functions import points_of
 from tests.blind.multibody.hidden import HELD_BACK, KINDS, Hidden, Setup, applied, draw, enlarged, in_worths, names_of
 from tests.blind.multibody.roads import Place, build_road
 from tests.blind.multibody.seal import LEDGER, SealError, open_truth, seal_truth
@@ -289,6 +290,33 @@ def test_odd_tyres_and_sensors_are_where_they_say():
     late, none = (clean_messages("city", 60.0, *h)[0].columns["a_x"] for h in ((tilt,), ()))
     after = (late - none)[np.argmax(late - none) :]
     assert after[[0, 200]] == pytest.approx(0.0981 * np.exp([0.0, -2.0 / 9.0]), rel=0.03)
+
+
+def test_points_are_a_form_as_a_diagnosis_has_it():
+    def points(name, where=None, **values):
+        plan = draw_plan(4, 1, "null", duration_s=20.0)._replace(programme="country")
+        plan = plan._replace(hidden=(Hidden(name, where, values),))
+        (hidden,) = make_case(plan, z_least=0.0).truth["hidden"]
+        found = hidden["points"]
+        return plan.car, found, *(np.array(found[n]) for n in ("x", "f"))
+
+    _, found, x, f = points("speed_hump", force=-90.0, centre=18.0, width=2.0)
+    assert (found["unit"], x.size) == ("N", 100)
+    assert f == pytest.approx(-90.0 * np.exp(-0.5 * ((x - 18.0) / 2.0) ** 2), abs=0.02)
+    _, found, x, f = points("speed_dependent_gain", "a_x", rate=0.01)
+    assert (found["unit"], f) == ("-", pytest.approx(0.01 * (x - 15.0), abs=1e-5))
+    _, found, x, f = points("yawing_slip", rate=5.0)
+    assert found["slip_r"] == pytest.approx(1.0 / (1.0 + 5.0 * np.abs(x)) - 1.0, abs=1e-4)
+    assert not any(found["slip_f"])
+    car, found, x, f = points("torque_read_in_speed", rate=0.03)
+    slip = 200.0 / (car.r_e[2] * car.slope[2] * car.static[2])  # of a rear wheel with 200 N m
+    there = np.interp(400.0 / car.split_rear, x, found["slip_r"])
+    assert there == pytest.approx(slip / (slip + 0.03 * 0.2**2) - 1.0, rel=0.03)
+    car, _, x, f = points("chalk", torque=30.0)
+    wheel = 0.5 * np.outer([1.0 - car.split_rear, car.split_rear], (x - f * car.r_e.mean())[x > 0.0])
+    assert (2.0 * wheel * (1.0 - np.exp(-((wheel / 30.0) ** 2)))).sum(axis=0) == pytest.approx(x[x > 0.0], rel=0.01)
+    assert f.min() < -100.0
+    assert points_of("way_waves", Setup(car, NO_ODD, Place()), []) is None
 
 
 def test_a_case_is_a_function_of_seed_and_number():

@@ -29,11 +29,17 @@ _COORDINATES = {
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """A shape without a name: what it may act by, over which coordinates, and how probable it is (NaN: not said)."""
+    """A shape without a name: what it may act by, over which coordinates, and how probable it is (NaN: not said).
+
+    `points`: (x, f) of its function over one coordinate, `f` in `unit`; `name`: the mechanism in the engine's words.
+    """
 
     mechanisms: tuple[str, ...]
     depends_on: frozenset[str]
     probability: float = math.nan
+    name: str = ""
+    unit: str = ""
+    points: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +129,12 @@ def _form(row: Mapping[str, Any]) -> Form:
     else:
         channel = str(row.get("channel", ""))
         by = next((m for name, m in _CHANNELS.items() if channel.startswith(name)), (mechanism_of(channel),))
-    return Form(by, coordinates_of(row.get("depends_on") or []), _finite(row.get("probability")))
+    pairs = zip(row.get("x") or (), row.get("f") or (), strict=True)
+    points = tuple((x[0], f) for x, f in pairs if len(x) == 1 and None not in (x[0], f))
+    return Form(
+        by, coordinates_of(row.get("depends_on") or []), _finite(row.get("probability")), str(row.get("mechanism")),
+        str(row.get("unit")), points,
+    )  # fmt: skip
 
 
 def _limits(document: Mapping[str, Any]) -> dict[str, float]:

@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from aqualog.model.effects import EFFECTS
 from tests.blind.judging.answers import Answer, Form, coordinates_of, exact_twins, judged_by, mechanism_of, twins_of
 from tests.blind.metrics.measure import right_first, right_or_listed
 from tests.blind.metrics.rows import Fact, Row, Said
 
-__all__ = ["Judged", "beyond", "facts_of", "fits", "judge", "limited"]
+__all__ = ["Judged", "beyond", "error_of", "facts_of", "fits", "judge", "limited"]
 
 LAGS = ("signal_delay", "clock_skew")
 
@@ -99,8 +101,18 @@ class Judged:
             return True
         if self.unknown is None or not self.forms or self.row.verdict != "unexplained":
             return False
-        first = max(self.forms, key=lambda f: f.probability if math.isfinite(f.probability) else -1.0)
-        return fits(first, self.unknown, exact=exact)
+        return fits(self._first, self.unknown, exact=exact)
+
+    @property
+    def _first(self) -> Form:
+        return max(self.forms, key=lambda f: f.probability if math.isfinite(f.probability) else -1.0)
+
+    @property
+    def function_error(self) -> float:
+        """Of a right form, see `error_of`; NaN of others."""
+        if self.unknown is None or self.is_accepted or not self.form_is_right:
+            return math.nan
+        return error_of(self._first, self.unknown)
 
 
 def fits(form: Form, unknown: Mapping[str, Any], *, exact: bool) -> bool:
@@ -108,6 +120,24 @@ def fits(form: Form, unknown: Mapping[str, Any], *, exact: bool) -> bool:
     right = [coordinates_of(unknown["depends_on"]), *(coordinates_of(x) for x in unknown.get("also") or ())]
     over = form.depends_on in right if exact else any(form.depends_on & r for r in right)
     return over and mechanism_of(unknown["mechanism"]) in form.mechanisms
+
+
+def error_of(form: Form, unknown: Mapping[str, Any]) -> float:
+    """Rms of said less true function over that of the true one, where both are known; NaN without points.
+
+    Means stay in. What an effect beside the form carries is not counted.
+    """
+    true = unknown.get("points")
+    # a gain over its own signal is an offset over that
+    is_gain = true is not None and (form.unit, true["unit"], *form.depends_on) == ("-", "m/s^2", "a_x")
+    if true is None or (form.unit != true["unit"] and not is_gain):
+        return math.nan
+    both = [(x, f * x if is_gain else f) for x, f in form.points if true["x"][0] <= x <= true["x"][-1]]
+    if not both:
+        return math.nan
+    x, said = np.array(both).T
+    f = np.interp(x, true["x"], true.get(form.name, true["f"]))
+    return float(np.sqrt(np.mean((said - f) ** 2) / max(np.mean(f**2), 1e-24)))
 
 
 def facts_of(truth: Mapping[str, Any]) -> tuple[Fact, ...]:

@@ -256,6 +256,13 @@ def unknown(cases: Sequence[Judged]) -> list[Measure]:
         share(11, "misnamed", [c.wrong for c in some], "<= 0.05", least=40,
               note=_said([c for c in some if c.wrong])),
     ]  # fmt: skip
+    errors = [x for c in some if math.isfinite(x := c.function_error)]
+    out += [
+        quantity(
+            11, "function error of right forms, median", errors, lambda x: float(np.median(x)), "<= 0.15", least=40
+        ),
+        share(11, "function error of right forms at most 15 %", [x <= 0.15 for x in errors], "-"),
+    ]
     for name, group in sorted(by(some, lambda c: str((c.unknown or {})["kind"])).items()):
         text = f"  {name}" + (", held back" if any((c.unknown or {})["held_back"] for c in group) else "")
         note = _missed([c for c in group if not c.form_is_right])

@@ -17,6 +17,7 @@ from aqualog.core.vehicle import Vehicle
 
 from .car import NO_ODD, Car, draw_car, of_the_day, vehicle_file
 from .driver import ROWS, draw_style, drive_along
+from .functions import points_of
 from .hidden import DRY, KINDS, TWINS, Hidden, Setup, applied, draw, enlarged, in_worths, names_of
 from .roads import Place, bends, build_road, speeds
 from .sensors import NOISES, WHEELS, Message, coloured, gusts, ideal, measure
@@ -104,7 +105,7 @@ def make_case(plan: Plan, *, z_least: float = Z_LEAST) -> Case:
         "hidden": [
             {"effect": h.name, "where": h.where, "values": dict(h.values), "known": KINDS[h.name].known,
              "held_back": KINDS[h.name].held_back, "accepts": KINDS[h.name].accepts, "channel": KINDS[h.name].channel,
-             "depends_on": KINDS[h.name].depends_on, **z}
+             "depends_on": KINDS[h.name].depends_on, "points": points_of(h.name, _setup(plan, (h,), 0), seen[0]), **z}
             for h, z in zip(hidden, shown, strict=True)
         ],
         "programme": plan.programme, "noise": plan.noise, "seed": plan.seed, "electric": plan.car.is_electric > 0.5,

@@ -33,7 +33,7 @@ from .dynamics import (
     advance,
 )  # fmt: skip
 
-__all__ = ["ROWS", "draw_style", "drive_along"]
+__all__ = ["ENGINE_HOLDS", "MOTOR_HOLDS", "ROWS", "draw_style", "drive_along"]
 
 DT = 0.01
 G = 9.81
@@ -47,6 +47,7 @@ ROWS = {name: i for i, name in enumerate((
 _OMEGA, _TORQUE, _ANGLE, _LOAD, _SLIP, _FORCE, _LOST = (ROWS[f"{s}_fl"] for s in (
     "omega", "torque", "angle", "load", "slip", "force", "lost"))  # fmt: skip
 _WIDTH = len(ROWS)
+ENGINE_HOLDS, MOTOR_HOLDS = 0.025, 0.14  # of the weight, before the brakes
 UPSHIFTS = np.array([5.0, 10.0, 15.5, 21.5, 29.0])  # [m/s]
 
 
@@ -105,7 +106,7 @@ def drive_along(target, coast, lateral, unrest, wander, gust, fine, slow, p, odd
             force = -0.12 * mass * G
         if coast[k] > 0.5:
             force = 0.0
-        least = (-0.14 if p.is_electric > 0.5 else -0.025) * mass * G * tanh(max(v - 0.5, 0.0) / 2.0)
+        least = (-MOTOR_HOLDS if p.is_electric > 0.5 else -ENGINE_HOLDS) * mass * G * tanh(max(v - 0.5, 0.0) / 2.0)
         up = min(force, min(grip, p.power / max(v, 4.0))) * radius
         down = 0.0
         if force < least:

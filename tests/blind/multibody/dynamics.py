@@ -8,7 +8,7 @@ from aqualog.core.compiled import compiled
 
 from .tyre import load_factor, lost_share, tmeasy, water_push
 
-__all__ = ["AUX", "STATES", "H", "advance", "at", "odd_force"]
+__all__ = ["AUX", "STATES", "H", "advance", "at", "odd_force", "odd_slope"]
 
 G = 9.81
 H = 5e-4  # [s]
@@ -124,17 +124,23 @@ def _driveline(y, f, aux, drive, gear, p):
 def _slope(i, t, y, aux, leak, lost, p, odd, linger):
     slope = p.slope[i] * load_factor(aux[LOAD + i], p.load_ref[i], p.load_law[i])
     slope *= exp(p.slope_drift[i] * t) * (1.0 + p.leak_slope[i] * leak) * (1.0 - lost) ** p.law[9]
+    return slope * odd_slope(i, aux[T_SHAFT + i], y[YAW], y[VX], y[WAY], linger, odd)
+
+
+@compiled
+def odd_slope(i, torque, yaw, v, way, linger, odd):
+    """Factor on the slope of wheel i that no effect has; `torque` of its shaft."""
+    factor = 1.0 - odd.soft[0] * linger
     if odd.saddle[0] != 0.0:
-        slope *= 1.0 - odd.saddle[0] * _bell(abs(aux[T_SHAFT + i]), odd.saddle[1], odd.saddle[2])
+        factor *= 1.0 - odd.saddle[0] * _bell(abs(torque), odd.saddle[1], odd.saddle[2])
     if odd.turning[0] != 0.0 and i > 1:
-        slope *= 1.0 / (1.0 + odd.turning[0] * abs(y[YAW]))
+        factor *= 1.0 / (1.0 + odd.turning[0] * abs(yaw))
     if odd.hum[0] != 0.0:
-        slope *= 1.0 - odd.hum[0] * _bell(y[VX], odd.hum[1], odd.hum[2])
+        factor *= 1.0 - odd.hum[0] * _bell(v, odd.hum[1], odd.hum[2])
     if odd.galena[0] != 0.0:  # patches of two lengths
-        x = 2.0 * pi * y[WAY] / odd.galena[1] + odd.galena[2]
-        slope *= 1.0 - odd.galena[0] * 0.5 * (1.0 + tanh(6.0 * (sin(x) + sin(0.618 * x) - 0.3)))
-    slope *= 1.0 - odd.soft[0] * linger
-    return slope
+        x = 2.0 * pi * way / odd.galena[1] + odd.galena[2]
+        factor *= 1.0 - odd.galena[0] * 0.5 * (1.0 + tanh(6.0 * (sin(x) + sin(0.618 * x) - 0.3)))
+    return factor
 
 
 @compiled

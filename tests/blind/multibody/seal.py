@@ -71,6 +71,7 @@ def judged_truth(sealed: bytes, folder: Path) -> dict[str, object]:
     unknown = None if form is None else {
         "mechanism": form["channel"], "depends_on": form["depends_on"], "kind": form["effect"],
         "held_back": form["held_back"], "accepts": form["accepts"], "parameters": form["values"],
+        "points": form.get("points"),
     }  # fmt: skip
     effects = [
         {"effect": h["effect"], "where": h["where"], "parameters": h["values"], "detectability": h.get("z")}

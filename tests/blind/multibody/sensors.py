@@ -14,7 +14,10 @@ from aqualog.core.compiled import compiled
 from .car import Car, gradients
 from .driver import ROWS
 
-__all__ = ["NOISES", "WHEELS", "Error", "Message", "coloured", "edges", "gusts", "ideal", "measure"]
+__all__ = [
+    "NOISES", "WHEELS", "Error", "Message", "coloured", "edges", "gusts", "hardly_read", "ideal", "measure",
+    "misread",
+]  # fmt: skip
 
 DT = 0.01
 G = 9.81
@@ -136,12 +139,10 @@ def _messages(rows, car, errors, noise, rng):
             e = errors.get(symbol, Error())
             x = truth[symbol] * (slow if stem == "torque" else 1.0)
             v = rows[:, ROWS["v_x"]]
-            x = x * (1.0 + e.by_speed * (v - 15.0)) + e.square * x * x
-            x = x + e.shake[0] / (1.0 + ((v - e.shake[1]) / e.shake[2]) ** 2)
-            x = x + e.tip[0] * _last_side(rows[:, ROWS["a_y"]], e.tip[1])
-            x = x + e.lean * np.maximum(rows[:, ROWS["torque_fl"] :][:, :4].sum(axis=1) / 1e3, 0.0)
+            torque = rows[:, ROWS["torque_fl"] :][:, :4].sum(axis=1)
+            x = misread(x, e, v, torque) + e.tip[0] * _last_side(rows[:, ROWS["a_y"]], e.tip[1])
             if e.dead != 0.0:
-                x = -x * np.expm1(-((x / e.dead) ** 2))
+                x = hardly_read(x, e.dead)
             x = x * (1.0 + e.pulse[0] * np.tanh(3.0 * np.sin(2.0 * np.pi * middle / e.pulse[1] + e.pulse[2])))
             when = t / (1.0 + e.skew * 1e-6) - e.delay + offset
             x = CubicSpline(middle, x)(np.clip(when, middle[0], middle[-1]))
@@ -156,6 +157,18 @@ def _messages(rows, car, errors, noise, rng):
             columns[symbol] = x
         out.append(Message(name, t, columns))
     return out
+
+
+def misread(x, e, v, torque=0.0):
+    """A signal as its error has it by the speed, by its own square and by the torque of all wheels."""
+    x = x * (1.0 + e.by_speed * (v - 15.0)) + e.square * x * x
+    x = x + e.shake[0] / (1.0 + ((v - e.shake[1]) / e.shake[2]) ** 2)
+    return x + e.lean * np.maximum(torque / 1e3, 0.0)
+
+
+def hardly_read(x, dead):
+    """A signal of which little is read below a size."""
+    return -x * np.expm1(-((x / np.maximum(dead, 1e-9)) ** 2))
 
 
 def _last_side(x: np.ndarray, threshold: float) -> np.ndarray:
