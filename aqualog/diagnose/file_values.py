@@ -6,6 +6,7 @@ The key stands in the effect's row: `DayToDay.key` of the whole car, `DriveSearc
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 from aqualog.core.notation import AXLES
 from aqualog.core.provenance import provenance_of, uncertainty
@@ -85,9 +86,13 @@ def calibrated_enough(vehicle: Vehicle) -> tuple[str, ...]:
     return tuple(p for p in _MATTERS if provenance_of(vehicle, p).source == "guess" and p not in bound)
 
 
-def not_calibrated(vehicle: Vehicle) -> str:
-    """The sentence for a file that is not calibrated enough, and what to do; empty if it is."""
-    keys = calibrated_enough(vehicle)
+def not_calibrated(vehicle: Vehicle, channels: Collection[str]) -> str:
+    """The sentence for a file that is not calibrated enough for these channels, and what to do; empty if it is.
+
+    Without a torque neither mass nor torque gain matter, and no drive calibrates them.
+    """
+    needs = {"mass": "force_balance", "torque_gain": "force_balance"}
+    keys = [k for k in calibrated_enough(vehicle) if needs.get(k, "slip") in " ".join(channels)]
     if not keys:
         return ""
     known = (

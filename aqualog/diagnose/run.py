@@ -168,7 +168,7 @@ def diagnose(
         notes=(*notes, *outcome.notes, *seen.notes, *((_SHARED,) if any(c.drives for c in outcome.causes) else ())),
         views=_views(ready, before, after, {n for c in outcome.causes for n in c.drives}) if options.views else (),
         agreement=tuple(a for a in agreed if a.key in named),
-        caution=not_calibrated(vehicle),
+        caution=not_calibrated(vehicle, ready[0].channels),
     )
 
 
@@ -191,7 +191,9 @@ def _simulated(
     moved = recentred(evidence, model)
     if moved != model:
         new = tuple(t for t in moved.terms if t not in model.terms)
-        notes = tuple(f"The vehicle file is not sure of it, and the drives move it: {term_words(t)}." for t in new)
+        notes = tuple(
+            f"An uncertain value of the vehicle file is likeliest on these drives with {term_words(t)}." for t in new
+        )
         model, bare = moved, Model((*bare.terms, *new))
         ready = [led_by(d, model) for d in ready]
         evidence = simulated(ready, asked, model, tell)
@@ -390,7 +392,8 @@ def _not_testable(
 ) -> Diagnosis:
     return Diagnosis(
         "not_testable", f"Not testable: {reason}.", tuple(d.name for d in drives), sum(d.duration_s for d in drives),
-        sum(d.used_s for d in drives), model, drives[0].channels, notes=notes, caution=not_calibrated(vehicle),
+        sum(d.used_s for d in drives), model, drives[0].channels, notes=notes,
+        caution=not_calibrated(vehicle, drives[0].channels),
     )  # fmt: skip
 
 

@@ -99,6 +99,8 @@ def _sentence(found: Validity, method: str, vehicle: str) -> str:
     else:
         said = "has no rating, because no signal moved enough"
     bad = [_limit_text(x) for x in found.limits if not x.is_valid]
+    if bad and method == "boundary":
+        bad[-1] += f", where {percent(found.plan.agreed)} of the time is asked for"
     good = "valid at all speeds driven" if found.limits else ""
     return f"{head} {said}; {' and '.join(bad) or good}."
 
@@ -119,6 +121,7 @@ def _limit_text(x: Limit) -> str:
 
 # --- sections --------------------------------------------------------------------------------------------------------
 
+_NO_CAUSE = "The diagnosis finds no cause: no single effect of the library explains what lies beyond the boundaries."
 _PLOTS = ("Signal", "Over", ("Within the boundaries", "within"), "Farthest beyond", "Tolerance", "From")
 _RATINGS = (
     "Signal", "Rating", "Corridor", "Phase", "Magnitude", "Slope", ("Simulation late [s]", "late [s]"), "Time [s]",
@@ -178,7 +181,9 @@ def _why(d: Mapping[str, Any]) -> list[Section]:
         ], "why-section", where="page")]  # fmt: skip
     causes = [c["sentence"] for c in why["causes"]]
     # the sentence of a single cause is in the verdict
-    lines = [why["sentence"], *(c for c in causes if c not in why["sentence"]), why["next"] or ""]
+    is_silent = why["verdict"] == "no_effect" and not all(x["valid"] for x in d["limits"])
+    said = _NO_CAUSE if is_silent else why["sentence"]
+    lines = [said, *(c for c in causes if c not in said), why["next"] or ""]
     return [Section("Why: the verdict of diagnose", [Lines([x for x in (why["caution"], *lines) if x])], "why-section")]
 
 

@@ -101,20 +101,25 @@ def test_a_value_that_is_said_to_be_surer_deviates_less():
     assert of("tyre_radius", "f", car=lost) == pytest.approx(0.015)
 
 
+EVERY = ("force_balance", "kinematic", "slip_fl")
+
+
 def test_what_to_calibrate_first():
     assert calibrated_enough(CAR) == ()
-    assert not_calibrated(CAR) == ""
+    assert not_calibrated(CAR, EVERY) == ""
     by_hand = replace(CAR, provenance={}, given=CAR.given - {"torque_gain"})
     assert calibrated_enough(by_hand) == ("torque_gain",)
-    assert not_calibrated(by_hand) == (
+    assert not_calibrated(by_hand, EVERY) == (
         "This vehicle file was not calibrated: it does not say where its values come from, so they count as exact; run "
         "`aqualog calibrate` on four or more dry drives, best with the weighed mass (--fix mass=...)."
     )
     weighed = replace(by_hand, provenance={"mass": Provenance("measured"), "wheels.r_e_f": Provenance("guess")})
-    assert not_calibrated(weighed) == (
+    assert not_calibrated(weighed, EVERY) == (
         "This vehicle file was not calibrated: torque_gain and wheels.r_e_f are guesses; run `aqualog calibrate` on "
         "four or more dry drives."
     )
+    assert "torque_gain" not in not_calibrated(weighed, ("kinematic", "slip_fl"))  # no torque: it does not matter
+    assert not_calibrated(by_hand, ("kinematic", "slip_fl")) == ""
     bound = replace(by_hand, provenance={"mass": Provenance("calibrated"), "torque_gain": Provenance("guess", 0.02)})
     assert calibrated_enough(bound) == ()  # the drives have shown the ratio of both
     assert calibrated_enough(Vehicle()) == ("mass", "torque_gain", "wheels.r_e_f", "wheels.r_e_r")

@@ -57,4 +57,7 @@ def test_a_guess_that_is_far_off_gets_no_name(monkeypatch, gain):
     log = changed(log, log.frame.with_columns(pl.col(f"torque_{w}") * gain for w in WHEELS))
     d = diagnose([("a", log)], replace(CAR, **off, provenance=UNSURE), options=QUICK)
     assert (d.verdict, d.causes) == ("no_effect", ())
-    assert any(n.startswith("The vehicle file is not sure of it, and the drives move it: tyre radius") for n in d.notes)
+    assert any(
+        n.startswith("An uncertain value of the vehicle file is likeliest on these drives with tyre radius")
+        for n in d.notes
+    )

@@ -162,7 +162,7 @@ def test_effects_that_are_certain_stand_beside_an_unknown_form(monkeypatch):
 
 
 def test_too_little_driving_is_not_testable(monkeypatch):
-    monkeypatch.setattr(run, "not_calibrated", lambda _: "Mass is a guess.")
+    monkeypatch.setattr(run, "not_calibrated", lambda *_: "Mass is a guess.")
     d = told(log=noisy(speed=((0.0, 15.0), (12.0, 15.0), (22.0, 1.0)), duration_s=40.0))
     assert d.verdict == "not_testable"
     assert "s of usable driving, 20 s are needed" in d.sentence

@@ -35,7 +35,8 @@ def document(found=FOUND, method="boundary", why=None):
 def test_the_sentence_of_the_boundaries():
     assert document()["sentence"] == (
         "By the method of ISO 19364, on another test: the simulation of the i30 is within the boundaries 97 % of the time, "
-        "farthest beyond them a_x by 0.12 m/s² at 4.1-6.3 s; not valid above 92 km/h on water."
+        "farthest beyond them a_x by 0.12 m/s² at 4.1-6.3 s; not valid above 92 km/h on water, where 95 % of the time is "
+        "asked for."
     )
 
 
@@ -55,13 +56,29 @@ def test_of_several_drives_the_worst_is_named():
 @pytest.mark.parametrize(
     ("limit", "told"),
     [
-        (Limit("on water", 50.0 / 3.6, 50.0 / 3.6, 120.0 / 3.6, 0.4, 30.0), "not valid on water (50 to 120 km/h)."),
-        (Limit("dry", 100.0 / 3.6, 50.0 / 3.6, 120.0 / 3.6, 0.4, 30.0), "not valid above 100 km/h on dry road."),
-        (Limit("dry", math.nan, 50.0 / 3.6, 120.0 / 3.6, 1.0, 30.0), "valid at all speeds driven."),
+        (Limit("on water", 50.0 / 3.6, 50.0 / 3.6, 120.0 / 3.6, 0.4, 30.0), "not valid on water (50 to 120 km/h)"),
+        (Limit("dry", 100.0 / 3.6, 50.0 / 3.6, 120.0 / 3.6, 0.4, 30.0), "not valid above 100 km/h on dry road"),
+        (Limit("dry", math.nan, 50.0 / 3.6, 120.0 / 3.6, 1.0, 30.0), "valid at all speeds driven"),
     ],
 )
 def test_limits_in_words(limit, told):
-    assert document(replace(FOUND, limits=(limit,)))["sentence"].endswith(told)
+    asked = "" if limit.is_valid else ", where 95 % of the time is asked for"
+    assert document(replace(FOUND, limits=(limit,)))["sentence"].endswith(f"{told}{asked}.")
+
+
+def test_no_effect_is_no_reason_why_not():
+    why = {
+        "verdict": "no_effect",
+        "sentence": "No effect: the model agrees.",
+        "caution": "",
+        "next_manoeuvre": None,
+        "causes": [],
+    }
+    for limits, is_valid in ((FOUND.limits, False), ((), True)):
+        found = replace(FOUND, limits=limits)
+        text = report_text(validation_report(found, document(found, why=why)))
+        assert ("the model agrees" in text) == is_valid
+        assert ("finds no cause" in text) != is_valid
 
 
 def test_a_rating_is_never_a_cause():

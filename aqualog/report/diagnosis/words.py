@@ -297,7 +297,7 @@ def _manoeuvre(m: Mapping[str, Any] | None) -> list[str]:
         return said
     lasting = f", {short(m['minutes'])} min" if m["minutes"] else ""
     now, then = percent(m["p_correct_now"]), percent(m["p_correct_then"])
-    return [*said, f"Probability of the right name: {now} now, {then} after this drive{lasting}."]
+    return [*said, f"Probability of the right name: {now} now, {then} afterwards{lasting}."]
 
 
 def mechanism_title(r: Mapping[str, Any]) -> str:
