@@ -68,14 +68,15 @@ _STATE = (
 def _over(*more: str | tuple[str, str], without: str = "") -> tuple[tuple[str, ...], ...]:
     """Each coordinate of the driving state alone, without some, and others.
 
-    No mechanism has both torque and acceleration: their difference is the residual of the balance, with its noise.
+    No mechanism has both torque and acceleration: their difference is the residual of the balance, with its noise. Of
+    lateral acceleration and yaw rate, which go together, sensors and radii have the first one.
     """
     state = tuple((n,) for n in _STATE if n not in without.split())
     return (*state, *((n,) if isinstance(n, str) else n for n in more))
 
 
 _SLIP = _over("t", without="steer_angle ambient_temperature a_x")
-_RADIUS = _over("t", without="steer_angle a_x water_depth")
+_RADIUS = _over("t", without="steer_angle yaw_rate a_x water_depth")
 MECHANISMS: tuple[Mechanism, ...] = (
     Mechanism(
         "force", "a force on the car", "unit_force", "N", 150.0, 7.5,
@@ -83,15 +84,15 @@ MECHANISMS: tuple[Mechanism, ...] = (
     ),
     Mechanism(
         "accelerometer", "an offset of the accelerometer", "accelerometer_bias@a_x", "m/s^2", 0.15, 0.005,
-        _over("t", without="torque steer_angle water_depth"),
+        _over("t", without="torque steer_angle yaw_rate water_depth"),
     ),
     Mechanism(
         "accelerometer_gain", "the gain of the accelerometer", "accelerometer_gain@a_x", "-", 0.05, 0.005,
-        _over("t", without="torque steer_angle water_depth since_braking"), is_fast=True, scales="a_x",
+        _over("t", without="torque steer_angle yaw_rate water_depth since_braking"), is_fast=True, scales="a_x",
     ),
     Mechanism(
         "torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.005,
-        _over("t", without="a_x steer_angle water_depth"), is_fast=True,
+        _over("t", without="a_x steer_angle yaw_rate water_depth"), is_fast=True,
     ),
     Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.035, _SLIP, is_fast=True,
               family="slip"),
@@ -105,11 +106,11 @@ MECHANISMS: tuple[Mechanism, ...] = (
     Mechanism("radius_r", "the radius of the rear wheels", "tyre_radius@r", "-", 0.005, 0.00035, _RADIUS),
     Mechanism(
         "velocity", "the scale of the reference velocity", "velocity_scale@v_x", "-", 0.01, 0.0005,
-        _over("position", "t", without="torque steer_angle"),
+        _over("position", "t", without="torque steer_angle yaw_rate since_braking water_depth"),
     ),
     Mechanism(
         "lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.05,
-        _over(without="torque a_x water_depth since_braking"),
+        _over(without="torque a_x steer_angle water_depth since_braking"),
     ),
     Mechanism(
         "bank", "the bank of the road", "accelerometer_bias@a_y", "m/s^2", 0.2, 0.0, (("position",), ("t",)),
