@@ -110,7 +110,7 @@ MECHANISMS: tuple[Mechanism, ...] = (
     ),
     Mechanism(
         "lateral", "the lateral acceleration", "accelerometer_bias@a_y", "m/s^2", 0.3, 0.05,
-        _over(without="torque a_x steer_angle water_depth since_braking"),
+        _over(without="a_x yaw_rate steer_angle water_depth since_braking"),
     ),
     Mechanism(
         "bank", "the bank of the road", "accelerometer_bias@a_y", "m/s^2", 0.2, 0.0, (("position",), ("t",)),
