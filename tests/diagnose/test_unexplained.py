@@ -140,7 +140,7 @@ def test_a_hump_in_speed_is_a_force_over_speed(monkeypatch):
     assert ok.mean() > 0.8
     assert np.sqrt(np.mean((r.f - truth)[ok] ** 2)) < 0.3 * np.sqrt(np.mean(truth[ok] ** 2))
     assert np.mean((r.low <= truth)[ok] & (truth <= r.high)[ok]) > 0.9
-    assert 0.9 < r.probability < 1.0
+    assert r.probability == unexplained.MOST  # however likely it is among the forms that there are
     assert 0.1 < r.share < 1.0
     assert r.nearest in {h.key for h in ASKED}
     assert "goes with speed" in r.sentence
@@ -325,7 +325,7 @@ def test_two_forms_of_two_axles_are_two():
     a = slipping(9, {"f": saddle, "r": lambda c: 0.8 * np.exp(-0.5 * ((c["v_x"] - 24.0) / 1.5) ** 2)})
     found = unknown_forms(a, compete(a), seed=1)
     assert [(r.mechanism, r.depends_on) for r in found] == [("slip_f", ("torque",)), ("slip_r", ("v_x",))]
-    assert min(r.probability for r in found) > 0.95
+    assert min(r.probability for r in found) == unexplained.MOST
     # each is of its own axle: so is its share
     assert sum(r.share for r in found) < 1.5
 
@@ -334,7 +334,7 @@ def test_an_axle_is_not_stated_surely_where_only_their_difference_is_known():
     difference = np.array([[-0.5, -0.5, 0.5, 0.5], [1.0, -1.0, 0.0, 0.0], [0.0, 0.0, 1.0, -1.0]])
     (r,) = unknown_forms(a := slipping(4, {"f": saddle}, turned=difference), p := compete(a), seed=1)
     assert p.marginal["slip()"] > 0.95
-    assert r.probability < 0.7
+    assert r.probability < 0.7 < unexplained.MOST
     other = {"slip_f": "rear", "slip_r": "front"}[r.mechanism]
     assert f"cannot be distinguished from the slip slope of the {other} axle" in r.sentence
 
