@@ -17,6 +17,7 @@ from aqualog.diagnose.campaign.observe import passes_of
 from aqualog.diagnose.campaign.passes import expected_values
 from aqualog.diagnose.run import Options
 from aqualog.diagnose.search import DOUBT
+from aqualog.diagnose.unexplained import MOST
 from aqualog.model.effects import EFFECTS
 from aqualog.model.log import as_signals
 from aqualog.model.programme import SEDAN
@@ -173,7 +174,7 @@ def test_a_hump_of_no_effect_is_an_unknown_form():
     assert found.causes == ()
     form = found.remainders[0]
     assert (form.mechanism, form.depends_on) == ("resistance", ("v_x",))
-    assert form.probability >= 0.95
+    assert form.probability == MOST
     assert abs(3.6 * form.x[np.nanargmax(form.f), 0] - 78.0) < 5.0
     assert np.nanmax(form.low) > 0.02
 
