@@ -14,7 +14,7 @@ TESTS = Path(__file__).parent
 
 MOST_LINES = 95_420  # of the package: 77,720 before the verdict, the checks of inputs and `init`; 60,000 is the goal
 MOST_FILES = 518
-MOST_TEST_LINES = 69_110
+MOST_TEST_LINES = 69_120
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100

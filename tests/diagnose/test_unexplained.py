@@ -339,6 +339,16 @@ def test_an_axle_is_not_stated_surely_where_only_their_difference_is_known():
     assert f"cannot be distinguished from the slip slope of the {other} axle" in r.sentence
 
 
+def test_a_change_is_certain_where_the_mean_is_not():
+    at, supported = np.array([[1.0, 0.0], [1.0, 1.0]]), np.ones(2, dtype=bool)
+    block = Block("a", "shape", (0, 1), np.eye(2), 0.0, 0)
+    basis = SimpleNamespace(at_points=at, supported=supported)
+    field = SimpleNamespace(blocks=(block,), sd=np.ones(2), shapes=(SimpleNamespace(basis=basis),))
+    for constant, change, least in ((1.0, 1e-4, 0.2), (1.0, 1.0, 0.0)):
+        fit = Fitted([0, 1], np.array([0.1, 0.5]), np.diag([constant, change]))
+        assert unexplained._surely(field, fit, 0, 1) == pytest.approx(least, abs=0.05)
+
+
 def shown(channels, y, functions, manners):
     """Where forces show that have these functions (C, n)."""
     force = next(m for m in MECHANISMS if m.name == "force")
