@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -24,30 +25,36 @@ __all__ = ["Begun", "Fitted", "Members", "Posterior", "begin", "compete", "rule"
 ROUGHLY = 2  # sets that are carried on while the noise is sought
 ROUNDS = 4  # of noise, each after what the one before has found
 PAIRS, SEED = 2, 20  # of draws of a set's values
-CLEARLY = 1.0  # [nats] that a noise must make the measurement more likely
 NEGLIGIBLE = 0.3  # variance, in units of white noise's, of a direction of the tolerances that is left out
 
 
 @dataclass(frozen=True, slots=True)
 class Posterior(Sets):
-    """The posterior over sets with its inner products, `gram` plain and `tolerant`."""
+    """The posterior over sets with its inner products, `gram` plain and `tolerant`.
+
+    `most`: nats by which any set may be likelier than none. What is slow may as well be noise, and beside the best set
+    the noise has no part of it: none at all is less likely there than beside a noise of its own.
+    """
 
     gram: FloatArray
     tolerant: FloatArray
     weighings: tuple[Weighing, ...]
+    most: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
 class _Noise:
     """A noise beside a set, with the set's values there.
 
-    `likely`: log of the measurement's marginal likelihood under noise, tolerances and the set, with the set's prior.
+    `likely`: log of the measurement's marginal likelihood under noise, tolerances and the set, with the set's prior;
+    `bare` under noise and tolerances alone.
     """
 
     members: Members
     weighings: tuple[Weighing, ...]
     fit: Fitted
     likely: float
+    bare: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,27 +89,36 @@ def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -
     only = begun is None
     begun = begun or begin(arena)
     noise = begun.after((), None)
+    bare = noise.bare
     gram = arena.inner(noise.weighings)
     for number in range(only, rounds + only):  # what is only asked for once is not kept
         tolerant = arena.tolerant(gram)
         sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram), width=ROUGHLY)
         best = max(sets, key=lambda k: sets[k])
         coloured = [(m, fitted_in(arena.blocks, tolerant, m), number) for m in _first(arena, tolerant, best)]
-        others = dict.fromkeys([*_first(arena, begun.whitely, best), *_first(arena, begun.whitely, ())[1:]])
+        # a noise beside what is within the tolerances is no finding, and what else there is has to be seen beside it
+        bases = dict.fromkeys([best, noise.members])
+        each = (m for b in (*bases, ()) for m in _first(arena, begun.whitely, b))
+        others = dict.fromkeys(m for m in each if m or m == best)
         white = [(m, fitted_in(arena.blocks, begun.whitely, m), 0) for m in others]
         tried = beside(lambda s: begun.after(*s), [*coloured, *white])
         # white noise is wrong: a second step is fairer
         likeliest = max(tried[len(coloured) :], key=lambda n: n.likely)
         tried += [begun.after(likeliest.members, likeliest.fit, number)]
         better = max(tried, key=lambda n: n.likely)
-        if better.likely < noise.likely + CLEARLY:
+        bare = max(bare, *(n.bare for n in tried))
+        if better.likely <= noise.likely:
             break
         noise = max(better, begun.after(better.members, better.fit, number), key=lambda n: n.likely)
         gram = arena.inner(noise.weighings)
     tolerant = arena.tolerant(COARSE * gram)
     sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram))
+    most = max(noise.likely - bare, 0.0) if noise.members else math.inf
+    sets[()] = max(sets[()], max(sets.values()) - most)
     found = ranked(sets, arena.name)
-    return Posterior(found.sets, found.probability, found.marginal, found.blocks, gram, tolerant, noise.weighings)
+    return Posterior(
+        found.sets, found.probability, found.marginal, found.blocks, gram, tolerant, noise.weighings, most
+    )  # fmt: skip
 
 
 def _first(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
@@ -155,10 +171,10 @@ def _beside(begun: Begun, members: Members, fit: Fitted | None) -> _Noise:
     forgiven = forgiving(gram, allowed)
     numbers = tuple(range(len(own)))
     gained = joined(forgiven.gram, own, numbers).evidence
-    likely = gained - 0.5 * float(forgiven.gram[-1, -1]) - forgiven.room - sum(w.sharpness for w in weighings)
+    bare = -0.5 * float(forgiven.gram[-1, -1]) - forgiven.room - sum(w.sharpness for w in weighings)
     found = fitted_in(own, forgiven.gram, numbers)
     columns = [c for m in members for c in arena.blocks[m].columns]
-    return _Noise(members, weighings, replace(found, columns=columns), likely)
+    return _Noise(members, weighings, replace(found, columns=columns), gained + bare, bare)
 
 
 def rule(evidence: Evidence, blocks: Sequence[Block], gram: FloatArray) -> MayJoin:

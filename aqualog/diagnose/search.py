@@ -298,7 +298,8 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
         if kept and kept in out and out[kept].evidence < out[m].evidence:
             out[kept] = replace(out[kept], evidence=out[m].evidence, beyond=tuple(b for b in m if b not in kept))
     out = {m: o for m, o in out.items() if (within.get(m, m) == m if o.refit else not beyond & set(m))}
-    return _levelled(evidence, arena, out, within.get(best, best), equal)
+    none = max(bare, max(o.evidence for o in out.values()) - posterior.most)
+    return _levelled(evidence, arena, out | {(): Option((), none)}, within.get(best, best), equal)
 
 
 def _levelled(
