@@ -12,9 +12,9 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 95_420  # of the package: 77,720 before the verdict, the checks of inputs and `init`; 60,000 is the goal
+MOST_LINES = 95_470
 MOST_FILES = 518
-MOST_TEST_LINES = 69_120
+MOST_TEST_LINES = 69_160
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100

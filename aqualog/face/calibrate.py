@@ -91,7 +91,7 @@ class Calibration(Result):
         return calibration_report(self.found, self.file_notes, tuple(r for _, r in self.checks))
 
     def headline(self) -> str:
-        from aqualog.report.calibration import based_on, parameter_cells
+        from aqualog.report.calibration import estimated, parameter_cells
 
         found = self.found
         known = [p for p in found.parameters if p.identified]
@@ -102,8 +102,7 @@ class Calibration(Result):
         not_found = ", ".join(p.name for p in found.parameters if not p.identified and "[" not in p.name)
         return "\n".join(
             [
-                f"{found.vehicle_name}: {len(known)} of {len(found.parameters)} parameters estimated from "
-                f"{based_on(found)}; value (95 %)",
+                f"{found.vehicle_name}: {estimated(found)}; value (95 %)",
                 *("  " + "; ".join(values[i : i + 2]) for i in range(0, len(values), 2)),
                 *([f"  not determined: {not_found}"] if not_found else []),
             ]

@@ -141,6 +141,11 @@ class Parameter:
         size = 0.5 * self.sigma
         return size if self.high - self.neutral >= size else -size
 
+    @property
+    def is_share(self) -> bool:
+        """Whether it is a gain or a share, which is read in per cent."""
+        return self.unit == "-" and (self.neutral == 1.0 or any(w in self.meaning for w in ("relative", "share")))
+
 
 @dataclass(frozen=True, slots=True)
 class Table:

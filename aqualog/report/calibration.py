@@ -20,7 +20,7 @@ from aqualog.report.sections import Figures, Lines, Para, Report, Section, Table
 from aqualog.report.theme import MUTED, wheel_colour
 from aqualog.report.values import KMH, fields_of, plain, pretty_unit
 
-__all__ = ["balance_residuals", "based_on", "calibration_document", "calibration_report", "parameter_cells"]
+__all__ = ["balance_residuals", "calibration_document", "calibration_report", "estimated", "parameter_cells"]
 
 _PARAMETERS = ("Parameter", "Value", "95 %", "Unit", "Vehicle file", "Remark")
 _DRIVES = (
@@ -85,13 +85,14 @@ def calibration_report(c: Calibration, notes: Sequence[str] = (), checks: Sequen
         What does not fit among the signals.
     """
     known = [p for p in c.parameters if p.identified]
-    head = f"{c.vehicle_name}: {len(known)} of {len(c.parameters)} parameters estimated from {based_on(c)}"
+    head = f"{c.vehicle_name}: {estimated(c)}"
     plots = {f"residual-{i}": figure for i, figure in enumerate(balance_residuals(c))} if c.drives else {}
     sections = [
         *input_sections(checks),
         Section("", [Para(head, where="text")]),
-        Section("Parameters", [Table(_PARAMETERS, [parameter_cells(p) for p in known], "parameters", (0, 3, 5))],
-                "parameters-section"),
+        Section("Parameters", [
+            Table(_PARAMETERS, [parameter_cells(p) for p in known], "parameters", (0, 3, 5), wide=(5,)),
+        ], "parameters-section"),
         Section("Not determined by these drives", [Lines([displayed_text(x) for x in c.cannot_tell], most=1000)],
                 "cannot-tell", look="problems"),
         Section("Drives", [
@@ -114,10 +115,12 @@ def calibration_report(c: Calibration, notes: Sequence[str] = (), checks: Sequen
     )
 
 
-def based_on(c: Calibration) -> str:
-    """`4 drives`, `8 passes over water`: what the estimates rest on."""
-    used = sum(not p.why for p in c.passes)
-    return f"{used} passes over water" if c.passes else f"{len(c.drives)} drives"
+def estimated(c: Calibration) -> str:
+    """`9 of 12 parameters estimated from 4 drives`, and how many of these the vehicle file contradicts."""
+    known, kept = ([p for p in c.parameters if p.identified], [p for p in c.parameters if p.kept])
+    used = f"{sum(not p.why for p in c.passes)} passes over water" if c.passes else f"{len(c.drives)} drives"
+    own = f"; {len(kept)} of them contradict the vehicle file, which keeps its own" if kept else ""
+    return f"{len(known)} of {len(c.parameters)} parameters estimated from {used}{own}"
 
 
 def _pass_cells(p: PassFit) -> tuple[str, ...]:

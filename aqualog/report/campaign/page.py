@@ -26,7 +26,7 @@ from aqualog.report.campaign.labels import group_text, key_title, value_text
 from aqualog.report.campaign.quality import Problem, problems_of
 from aqualog.report.campaign.run_page import BEHIND_S, RunFacts
 from aqualog.report.page import render
-from aqualog.report.values import KMH, cut, plain
+from aqualog.report.values import KMH, counted, cut, plain
 from aqualog.report.wording import detector_name
 
 __all__ = ["campaign_page"]
@@ -106,8 +106,8 @@ def _empty(findings: Findings, answers: Sequence[Answer], facts: Sequence[RunFac
 
 def _quality_line(problems: Sequence[Problem]) -> str:
     words = {"loss": "with data missing", "limit": "with limits on what can be judged", "note": "with notes"}
-    counts = {w: sum(p.weight == w for p in problems) for w in words}
-    told = [f"{n} {words[w]}" for w, n in counts.items() if n]
+    counts = {w: len({i for p in problems if p.weight == w for i, _ in p.runs}) for w in words}
+    told = [f"{counted(n, 'run')} {words[w]}" for w, n in counts.items() if n]
     return f"{'; '.join(told)}; each opens to its runs" if told else "no problem: all logs are there and intact"
 
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from aqualog.diagnose.records import ResidualView
+from aqualog.model.effects import EFFECTS
 from aqualog.report.diagnosis.figures import plots
 from aqualog.report.diagnosis.views import view_data
 from aqualog.report.diagnosis.words import (
@@ -191,10 +192,16 @@ def _separates(d: Mapping[str, Any]) -> list[str]:
 def _bar(x: Mapping[str, Any]) -> Bar:
     """A limit; the bar shows it over the smallest size worth naming."""
     is_sharp = x["ratio"] is not None and x["ratio"] <= 1.0
-    title = f"worth naming from {measured(x['smallest_worth_naming'], x['unit'])}"
+    title = f"worth naming from {_size(x, x['smallest_worth_naming'])}"
     if x["size"] is None:
         return Bar(effect_title(x["key"]), "not detectable at any size", "", is_sharp, title)
-    return Bar(effect_title(x["key"]), measured(x["size"], x["unit"]), _width(x["ratio"]), is_sharp, title)
+    return Bar(effect_title(x["key"]), _size(x, x["size"]), _width(x["ratio"]), is_sharp, title)
+
+
+def _size(x: Mapping[str, Any], size: float) -> str:
+    """A limit with its unit; gains and shares in per cent."""
+    is_share = x["effect"] in EFFECTS and EFFECTS[x["effect"]].parameters[0].is_share
+    return measured(100.0 * size, "%") if is_share else measured(size, x["unit"])
 
 
 def _width(ratio: float | None) -> str:

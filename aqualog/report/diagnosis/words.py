@@ -17,6 +17,9 @@ __all__ = [
 ]  # fmt: skip
 
 WORSE = 0.01  # rise of a channel's error that is reported
+FAR_OFF = (
+    0.5  # [m/s^2] error of an acceleration that is reported although nothing explains it: five times an offset (V, ESC)
+)
 _VERDICTS = {
     "no_effect": "No effect is missing",
     "named": "One cause",
@@ -158,12 +161,12 @@ def _alternative(a: Mapping[str, Any]) -> str:
         for value, interval in [interval_text(p)]
         if value
     )
-    ratio = a["evidence_ratio"]
-    how = f", {short(ratio)} times less likely" if ratio is not None else ""
     # a set is no more probable than the least probable of its causes
     known = [c["probability"] for c in a["causes"] if c.get("probability") is not None]
-    least = f", probability {'at most ' if len(a['causes']) > 1 else ''}{chance(min(known))}" if known else ""
-    return f"{names}{f': {values}' if values else ''}{how}{least}"
+    how = f", probability {'at most ' if len(a['causes']) > 1 else ''}{chance(min(known))}" if known else ""
+    if not known and a["evidence_ratio"] is not None:
+        how = f", {short(a['evidence_ratio'])} times less likely"
+    return f"{names}{f': {values}' if values else ''}{how}"
 
 
 def _agreement(a: Mapping[str, Any]) -> str:
@@ -258,8 +261,9 @@ def _score(g: Mapping[str, Any] | None) -> list[str]:
 
 
 def _channels(document: Mapping[str, Any]) -> tuple[list[str], list[str]]:
-    """The error of each channel before and after, and a sentence on those that grow, which the list may hide."""
-    told, grown = [], []
+    """The error of each channel before and after; sentences on those that grow, which the list may hide, and on an
+    acceleration that stays far off: causes may be sure beside it, and leave it."""
+    told, grown, left = [], [], []
     for name, c in by_change(document):
         parts = []
         for kind, error, short_error in (
@@ -271,11 +275,14 @@ def _channels(document: Mapping[str, Any]) -> tuple[list[str], list[str]]:
                 grown.append(f"{channel_title(name)} +{percent(change)} {short_error}")
             if before is None or after is None:
                 continue
+            if kind == "rmse" and c["unit"] == "m/s^2" and after > FAR_OFF:
+                left.append(f"{channel_title(name)} stays {short(after)} m/s² off")
             sign = "" if not change else "+" if change > 0 else "−"
             by = "" if change is None else f" ({sign}{percent(abs(change))})"
             parts.append(f"{error} {short(before)} → {short(after)} {pretty_unit(c['unit'])}".rstrip(" –") + by)
         told += [f"{upper_first(channel_title(name))}: {', '.join(parts)}."] if parts else []
-    return told, [f"Larger error with the extended model: {'; '.join(grown)}."] if grown else []
+    worse = [f"Larger error with the extended model: {'; '.join(grown)}."] if grown else []
+    return told, [*worse, *([f"Not explained: the {'; the '.join(left)}, for the next sample."] if left else [])]
 
 
 def _consequence(c: Mapping[str, Any]) -> str:
@@ -292,7 +299,9 @@ def _consequence(c: Mapping[str, Any]) -> str:
 def _manoeuvre(m: Mapping[str, Any] | None) -> list[str]:
     if m is None:
         return []
-    said = [m["sentence"]] if m["sentence"] else [f"{upper_first(m['name'].replace('_', ' '))}."]
+    if m["sentence"]:
+        return [m["sentence"]]  # which has both probabilities
+    said = [f"{upper_first(m['name'].replace('_', ' '))}."]
     if m["p_correct_now"] is None or m["p_correct_then"] is None or m["name"] in ("none", "sensor"):
         return said
     lasting = f", {short(m['minutes'])} min" if m["minutes"] else ""

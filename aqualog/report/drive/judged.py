@@ -19,7 +19,7 @@ __all__ = [
 
 KIND_NAMES: dict[EpisodeKind, str] = {
     "aquaplaning": "aquaplaning", "suspected": "suspected", "other_surface": "other surface",
-    "wheel_lock": "wheel lock", "single_detector": "single detector",
+    "wheel_lock": "braking slip", "single_detector": "single detector",
 }  # fmt: skip
 FOLDED: tuple[EpisodeKind, ...] = ("wheel_lock", "single_detector")
 """Kinds that are no answer to the question for water; a page folds them, a terminal counts them."""
@@ -86,7 +86,7 @@ def lines_of(judgement: Judgement, most: int) -> list[str]:
 
 
 def folded_line(kind: EpisodeKind, episodes: Sequence[Episode]) -> str:
-    """`Wheel lock: 41 episodes, 112 detections`; one alone is shown whole."""
+    """`Braking slip: 41 episodes, 112 detections`; one alone is shown whole."""
     name = KIND_NAMES[kind].capitalize()
     if len(episodes) == 1:
         return f"{name}: {episode_sentence(episodes[0])}"

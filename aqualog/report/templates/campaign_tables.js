@@ -222,9 +222,14 @@ function eventWords(i) {
   return words.map(function (w) { return w[1] > 1 ? `${w[0]} ${w[1]}×` : w[0]; }).join(", ");
 }
 
-// Events of a run on or off water; -1 where the lane is not known.
+// Events of a run on or off water; -1 where the lane is not known, whose events are counted all the same.
 function sum(i, column) { return countOf(i, -1, 4) ? -1 : countOf(i, -1, column); }
-function sumText(column) { return function (i) { const n = sum(i, column); return n < 0 ? "–" : String(n); }; }
+function sumText(column) {
+  return function (i) {
+    const n = sum(i, column);
+    return n >= 0 ? String(n) : column === 2 ? `${countOf(i, -1, 4)} somewhere` : "–";
+  };
+}
 
 const STATES = ["done", "failed", "to do"];
 const VERDICTS = ["yes", "none", "cannot be judged"]; // in the order of the document

@@ -54,7 +54,7 @@ def test_what_the_page_tells_changes_with_the_document():
     d = round_trip(document_of("cannot_tell"))
     for place, key, value, said in (
         (d["gain"], "heldout_log_score_gain", 555.0, "555 natural units"),
-        (d["next_manoeuvre"], "minutes", 7.25, "7.25 min"),
+        (d["next_manoeuvre"], "sentence", "Weigh it in 7.25 min.", "Weigh it in 7.25 min."),
         (d["significance"], "achieved_level", 0.0444, "achieved 0.0444"),
         (d["limits"][0], "size", 17.0, "17 kg"),
         (d["untested"], "relaxation_length", "because of 11", "because of 11"),

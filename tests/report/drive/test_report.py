@@ -166,13 +166,13 @@ def test_lock_ups_are_folded(short):
     drive = fake.with_events(short, [replace(lock, start_s=5.0 * k, end_s=5.0 * k + 1.0) for k in range(40)])
     look, words = card(drive)
     assert look == "none"
-    assert "Wheel lock: 40 episodes, 40 detections" in words
+    assert "Braking slip: 40 episodes, 40 detections" in words
     page = drive_page(drive, title="t")
-    assert '<details class="fold"><summary>Wheel lock: 40 episodes, 40 detections</summary>' in page
+    assert '<details class="fold"><summary>Braking slip: 40 episodes, 40 detections</summary>' in page
     assert '<details class="fold"><summary>40 detections, one by one</summary>' in page
     text = report_text(drive_report(drive))
     assert text.startswith("No aquaplaning\n")
-    assert "Wheel lock: 40 episodes, 40 detections; --json lists them" in text
+    assert "Braking slip: 40 episodes, 40 detections; --json lists them" in text
     assert "Spin-down  FL" not in text
 
 

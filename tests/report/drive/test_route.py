@@ -46,7 +46,7 @@ def test_speed_is_the_colour_and_episodes_lie_on_the_way(result):
     assert drive["x"][-1] == pytest.approx(800.0, abs=1.0)
     assert drive["marker"]["color"][0] == pytest.approx(3.6 * result.features["v_x_hat"][0], abs=0.1)
     lock, wet = figure["data"][:2]
-    assert [lock["name"], wet["name"]] == ["wheel lock", "aquaplaning"]
+    assert [lock["name"], wet["name"]] == ["braking slip", "aquaplaning"]
     assert wet["x"][0] == pytest.approx(800.0 * 9.0 / 30.0, abs=1.0)
     assert wet["x"][-2] == pytest.approx(800.0 * 12.0 / 30.0, abs=1.0)
     assert wet["customdata"][0] == ["episodes", 0, "Aquaplaning: 9.0–12.0 s, 101 km/h, front left, partial"]
