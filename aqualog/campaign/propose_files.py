@@ -111,7 +111,8 @@ def vehicle_text(name: str, facts: Mapping[str, Fact] | None = None) -> str:
         "# Remove the # before each key that you know and write its value. What stands behind a # is not used.",
         "# SET marks keys that slip, forces and loads need in order to be right. Missing keys get the value of a",
         "# mid-size car, and detectors that need them report that.",
-        '# [provenance] at the end says where SET values come from. A key without a line there is "data_sheet".',
+        '# [provenance] at the end says where SET values come from. A key without a line there is "data_sheet";',
+        "# without that table every value counts as exact.",
         f"name = {_quoted(name)}",
         _key_line("drivetrain", known.get("drivetrain"), '""', 'SET  "rwd", "fwd" or "awd"'),
     ]

@@ -38,8 +38,8 @@ _EVENT = {
 _EPISODE = {
     "run": pl.Int64, "name": pl.String, "key": pl.String, "kind": pl.String, "start_s": pl.Float64, "end_s": pl.Float64,
     "wheels": pl.String, "axle": pl.String, "side": pl.String, "severity": pl.String, "v_x_kmh": pl.Float64,
-    "decided_by": pl.String, "delta_a_x_max": pl.Float64, "slip_min": pl.Float64, "distance_m": pl.Float64,
-    "events": pl.Int64,
+    "decided_by": pl.String, "delta_a_x_max": pl.Float64, "slip_min": pl.Float64, "slip_max": pl.Float64,
+    "distance_m": pl.Float64, "events": pl.Int64,
 }  # fmt: skip
 
 

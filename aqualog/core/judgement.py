@@ -38,7 +38,8 @@ class Episode:
     `wheels` are those that lost speed or grip, the worst first; `axle` (`f`, `r`) and `side` (`left`, `right`) where
     all of them share it. `v_x` is the mean speed [m/s], `distance_m` the way [m]; NaN where the speed is unknown.
     `decided_by` are the detectors behind the decision. `delta_a_x_max` is the largest resistance measure [m/s²],
-    `slip_min` the least slip [-]; NaN where unknown. `events` are indices into the events of the drive.
+    `slip_min` and `slip_max` the least and greatest slip [-]; NaN where unknown. `events` are indices into the events
+    of the drive.
     """
 
     kind: EpisodeKind
@@ -52,6 +53,7 @@ class Episode:
     decided_by: tuple[str, ...]
     delta_a_x_max: float
     slip_min: float
+    slip_max: float
     distance_m: float
     events: tuple[int, ...]
 
@@ -67,18 +69,19 @@ class Episode:
             "wheels": list(self.wheels), "axle": self.axle, "side": self.side, "severity": self.severity,
             "v_x_kmh": _short(_KMH * self.v_x), "decided_by": list(self.decided_by),
             "delta_a_x_max": _short(self.delta_a_x_max), "slip_min": _short(self.slip_min),
-            "distance_m": _short(self.distance_m), "events": list(self.events),
+            "slip_max": _short(self.slip_max), "distance_m": _short(self.distance_m), "events": list(self.events),
         }  # fmt: skip
 
     @staticmethod
     def of_document(e: Mapping[str, Any]) -> Episode:
         """Return the episode that JSON holds."""
-        speed, delta, slip, metres = (
-            math.nan if e[n] is None else float(e[n]) for n in ("v_x_kmh", "delta_a_x_max", "slip_min", "distance_m")
+        speed, delta, least, most, metres = (
+            math.nan if (x := e.get(n)) is None else float(x)  # results of before 0.35.0 lack `slip_max`
+            for n in ("v_x_kmh", "delta_a_x_max", "slip_min", "slip_max", "distance_m")
         )
         return Episode(
             e["kind"], e["start_s"], e["end_s"], tuple(e["wheels"]), e["axle"], e["side"], e["severity"], speed / _KMH,
-            tuple(e["decided_by"]), delta, slip, metres, tuple(e["events"]),
+            tuple(e["decided_by"]), delta, least, most, metres, tuple(e["events"]),
         )  # fmt: skip
 
 

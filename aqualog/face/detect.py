@@ -83,8 +83,8 @@ class Detection(Result):
             for e in self.document["episodes"]
         ]
         return table(
-            rows, "kind start_s end_s wheels axle side severity v_x_kmh decided_by delta_a_x_max slip_min distance_m "
-            "events", text=("kind", "wheels", "axle", "side", "severity", "decided_by", "events"),
+            rows, "kind start_s end_s wheels axle side severity v_x_kmh decided_by delta_a_x_max slip_min slip_max "
+            "distance_m events", text=("kind", "wheels", "axle", "side", "severity", "decided_by", "events"),
         )  # fmt: skip
 
     @property

@@ -172,7 +172,7 @@ def test_what_is_kept_at_full_rate_is_bounded():
     n, dt = 90_000, 0.01
     active = np.ones(n, dtype=bool)
     track = Track("minor_spin_down", "fl", "left", "m/s", np.ones(n), 1.0, active)
-    episode = Episode("aquaplaning", 10.0, 890.0, ("fl",), "f", "left", "partial", 20.0, (), 0.1, -0.1, 1e4, ())
+    episode = Episode("aquaplaning", 10.0, 890.0, ("fl",), "f", "left", "partial", 20.0, (), 0.1, -0.1, 0.0, 1e4, ())
     full = FullRate(dt)
     for a in range(0, n, 7000):
         part = slice(a, a + 7000)

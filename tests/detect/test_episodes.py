@@ -27,7 +27,7 @@ LANE = (
     event("minor_spin_down", 8.2, 16.7, "fr", slip_min=-0.2),
     event("joint_criteria", 8.3, 17.7, decided_by=["minor_spin_down"], delta_a_x_max=1.1, slip_min=-0.2),
     event("joint_cusum", 8.4, 17.6, decided_by=["minor_spin_down", "resistance"], delta_a_x_max=1.1),
-    event("spin_down", 8.6, 8.9, "fr", slip_min=-0.2),
+    event("spin_down", 8.6, 8.9, "fr", slip_min=-0.2, slip_max=0.31),
     event("minor_spin_down", 9.0, 9.4, "fl", slip_min=-0.02),
 )
 
@@ -37,7 +37,7 @@ def test_one_pass_is_one_episode_with_all_that_is_known_of_it():
     assert (e.kind, e.start_s, e.end_s, e.severity) == ("aquaplaning", 8.2, 17.7, "partial")
     assert (e.wheels, e.axle, e.side) == (("fr", "fl"), "f", None)
     assert e.decided_by == ("minor_spin_down", "resistance")
-    assert (e.delta_a_x_max, e.slip_min) == (1.1, -0.2)
+    assert (e.delta_a_x_max, e.slip_min, e.slip_max) == (1.1, -0.2, 0.31)
     assert e.v_x == pytest.approx(28.0)
     assert e.distance_m == pytest.approx(28.0 * 9.5)
     assert e.events == (0, 1, 2, 3, 4)

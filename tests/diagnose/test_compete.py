@@ -25,11 +25,13 @@ def chance(evidence):
 
 def test_a_drift_beside_noise_that_does_not_drift_is_certain():
     p, most = chance(drifting(0.0))
-    assert p > 0.99 and most > 20.0
+    assert p > 0.99
+    assert most > 20.0
 
 
 @pytest.mark.parametrize(("walk", "size", "seed"), [(0.05, 5.0, 11), (0.1, 8.0, 8)])
 def test_a_drift_that_may_as_well_be_noise_is_not_sure(walk, size, seed):
     """Beside the noise that is left without the drift it would be certain."""
     p, most = chance(drifting(walk, size, seed))
-    assert 0.5 < p < 0.95 and 0.0 < most < 3.0
+    assert 0.5 < p < 0.95
+    assert 0.0 < most < 3.0

@@ -285,6 +285,7 @@ JUDGEMENT = (
         several("decided_by", "detectors that decided"),
         number("delta_a_x_max", "m/s^2", "greatest resistance measure (2.9)", null=True),
         number("slip_min", "-", "least slip", null=True),
+        number("slip_max", "-", "greatest slip", null=True),
         number("distance_m", "m", "way", null=True),
         several("events", "places of its detections in `events`, from 0", count("", "")),
     )),

@@ -97,6 +97,7 @@ _EPISODES = Table(
         text("decided_by", "detectors that decided"),
         number("delta_a_x_max", "m/s^2", "greatest resistance measure (2.9)"),
         number("slip_min", "-", "least slip"),
+        number("slip_max", "-", "greatest slip"),
         number("distance_m", "m", "way"),
         count("events", "detections"),
     ),

@@ -26,7 +26,7 @@ FOLDED: tuple[EpisodeKind, ...] = ("wheel_lock", "single_detector")
 
 EPISODE_HEADS: Sequence[str | tuple[str, str]] = (
     "Episode", ("Start [s]", "from s"), ("End [s]", "to s"), "Where", "Severity", ("v_x [km/h]", "km/h"),
-    ("Resistance [m/s²]", "m/s²"), ("Least slip [%]", "slip %"), ("Distance [m]", "m"), ("Detections", ""),
+    ("Resistance [m/s²]", "m/s²"), ("Slip [%]", "slip %"), ("Distance [m]", "m"), ("Detections", ""),
     "Decided by",
 )  # fmt: skip
 _WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
@@ -132,10 +132,15 @@ def episode_cells(episode: Episode) -> list[str | Cell]:
         KIND_NAMES[episode.kind], _number(episode.start_s, 2), _number(episode.end_s, 2),
         Cell(", ".join(w.upper() for w in episode.wheels) or "vehicle", dot=WHEEL_COLOURS.get(first, "")),
         Cell(episode.severity, tag=episode.severity if episode.kind == "aquaplaning" else ""),
-        _number(KMH * episode.v_x, 0), _number(episode.delta_a_x_max, 2), _number(100.0 * episode.slip_min, 1),
+        _number(KMH * episode.v_x, 0), _number(episode.delta_a_x_max, 2), _number(100.0 * _slip(episode), 1),
         _number(episode.distance_m, 0), str(len(episode.events)),
         " + ".join(detector_name(d).lower() for d in episode.decided_by),
     ]  # fmt: skip
+
+
+def _slip(episode: Episode) -> float:
+    """The slip furthest from rolling, of wheels that slow down or spin. [-]"""
+    return max((x for x in (episode.slip_min, episode.slip_max) if math.isfinite(x)), key=abs, default=math.nan)
 
 
 def _number(x: float, decimals: int) -> Cell:

@@ -26,7 +26,20 @@ def test_each_event_becomes_a_span_with_what_the_document_says():
 
 def test_each_episode_becomes_a_span():
     episode = Episode(
-        "aquaplaning", 8.2, 17.7, ("fr", "fl"), "f", None, "partial", 28.0, ("resistance",), 1.1, -0.2, math.nan, (0,)
+        "aquaplaning",
+        8.2,
+        17.7,
+        ("fr", "fl"),
+        "f",
+        None,
+        "partial",
+        28.0,
+        ("resistance",),
+        1.1,
+        -0.2,
+        0.0,
+        math.nan,
+        (0,),
     )
     span, *_ = result_events(replace(make_result(), judgement=Judgement("aquaplaning", episodes=(episode,))))
     assert (span.name, span.start_ns, span.end_ns) == ("Aquaplaning", 8_200_000_000, 17_700_000_000)

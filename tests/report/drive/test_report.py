@@ -144,7 +144,7 @@ def test_resistance_is_shown_where_it_is_all_there_is(sizes, said):
     """The BMW i3 without wheel speeds."""
     alone = [
         Episode("single_detector", 9.0 * i, 9.0 * i + 5.0, (), None, None, "partial", 20.0, ("resistance",), x, math.nan,
-                100.0, (i,)) for i, x in enumerate(sizes)
+                math.nan, 100.0, (i,)) for i, x in enumerate(sizes)
     ]  # fmt: skip
     blind = Judgement("cannot_be_judged", ("omega_fl", "omega_fr"), ("resistance",), tuple(alone))
     assert judged_by(blind, 100.0) == ("Ran:", f"Resistance; no single detector decides by itself; {said}")

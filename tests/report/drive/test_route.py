@@ -35,7 +35,7 @@ def test_metres_across_the_date_line_and_without_a_fix():
 
 
 def episode(kind, start_s, end_s):
-    return Episode(kind, start_s, end_s, ("fl",), "f", "left", "partial", 28.0, (), 0.5, -0.1, 20.0, (0,))
+    return Episode(kind, start_s, end_s, ("fl",), "f", "left", "partial", 28.0, (), 0.5, -0.1, 0.02, 20.0, (0,))
 
 
 def test_speed_is_the_colour_and_episodes_lie_on_the_way(result):
