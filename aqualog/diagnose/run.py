@@ -103,8 +103,8 @@ def diagnose(
         return _not_testable(ready, model, reason, notes, vehicle)
     if model.terms:
         ready = [led_by(d, model) for d in ready]
-    evidence, model, bare, roads, untested, moved = _simulated(ready, model, tell)
-    ready, notes = list(evidence.drives), notes + moved
+    evidence, model, bare, roads, untested, about = _simulated(ready, model, tell)
+    ready, notes = list(evidence.drives), notes + about
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     notes += competing(found.arena.parts, ready)
     found, outcome = _with_slow_force(found, conclude(found, model), model)
@@ -146,6 +146,7 @@ def diagnose(
     sentence = verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
         seen=p if p <= options.level else None, untested=untested | seen.untested,
+        moved=bare.terms[len(with_known(given, vehicle).terms) :],
     )  # fmt: skip
     return Diagnosis(
         verdict=outcome.verdict,

@@ -90,11 +90,13 @@ def verdict_sentence(
     seen: float | None = None,
     source: str = "log",
     untested: Mapping[str, str] | None = None,
+    moved: Sequence[Term] = (),
 ) -> str:
     """The verdict in one sentence, of a log that can be tested.
 
     `certain`: effects that are certain where others cannot be distinguished; `seen`: the test's p-value where it
-    found more than noise; `source`: `log` or `campaign`; `untested`: effects that the log cannot show, and why.
+    found more than noise; `source`: `log` or `campaign`; `untested`: effects that the log cannot show, and why;
+    `moved`: values of the vehicle file that the model has otherwise.
     """
     names = [name_of(c.effect, c.where) + (f" in {listed(c.drives)}" if c.drives else "") for c in causes]
     if verdict == "no_effect" and seen is not None:
@@ -106,6 +108,8 @@ def verdict_sentence(
         if why and why[0][1] >= MANY_UNTESTED:
             most = "" if why[0][1] == len(untested or {}) else f"{why[0][1]} of them: "
             few = f"; {len(untested or {})} effects were not tested ({most}{why[0][0]})"
+        if moved:
+            few += f". It does with {listed([*map(term_words, moved)])}: the vehicle file is not sure of its own"
         return f"{agrees}{few}."
     if verdict == "named":
         return causes[0].sentence

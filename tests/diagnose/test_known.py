@@ -61,3 +61,5 @@ def test_a_guess_that_is_far_off_gets_no_name(monkeypatch, gain):
         n.startswith("An uncertain value of the vehicle file is likeliest on these drives with tyre radius")
         for n in d.notes
     )
+    assert " It does with " in d.sentence
+    assert d.sentence.endswith(": the vehicle file is not sure of its own.")
