@@ -32,7 +32,7 @@ NEGLIGIBLE = 0.3  # variance, in units of white noise's, of a direction of the t
 class Posterior(Sets):
     """The posterior over sets with its inner products, `gram` plain and `tolerant`.
 
-    `most`: nats by which any set may be likelier than none. What is slow may as well be noise, and beside the best set
+    `most`: [nats (natural logarithm)] by which any set may be likelier than none. What is slow may as well be noise, and beside the best set
     the noise has no part of it: none at all is less likely there than beside a noise of its own.
     """
 
