@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena, products
-from aqualog.diagnose.competition import COARSE, Block, State, joined, placed
+from aqualog.diagnose.competition import COARSE, COARSE_FORMS, Block, State, joined, placed
 from aqualog.diagnose.evidence import Evidence, forgiving
 from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.shapes import ALONG
@@ -32,8 +32,9 @@ NEGLIGIBLE = 0.3  # variance, in units of white noise's, of a direction of the t
 class Posterior(Sets):
     """The posterior over sets with its inner products, `gram` plain and `tolerant`.
 
-    `most`: [nats (natural logarithm)] by which any set may be likelier than none. What is slow may as well be noise, and beside the best set
-    the noise has no part of it: none at all is less likely there than beside a noise of its own.
+    `most`: by which any set may be likelier than none [nats (natural logarithm)]. What is slow may as well be noise,
+    and beside the best set the noise has no part of it: none at all is less likely there than beside a noise of its
+    own.
     """
 
     gram: FloatArray
@@ -111,7 +112,8 @@ def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -
             break
         noise = max(better, begun.after(better.members, better.fit, number), key=lambda n: n.likely)
         gram = arena.inner(noise.weighings)
-    tolerant = arena.tolerant(COARSE * gram)
+    forms = any(b.kind == "shape" for b in arena.blocks)
+    tolerant = arena.tolerant((COARSE_FORMS if forms else COARSE) * gram)
     sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram))
     most = max(noise.likely - bare, 0.0) if noise.members else math.inf
     sets[()] = max(sets[()], max(sets.values()) - most)

@@ -23,12 +23,14 @@ from numpy.typing import NDArray
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "COARSE", "SCALES", "Block", "Packed", "State", "added", "joined", "packed", "placed", "scores",
+    "COARSE", "COARSE_FORMS", "SCALES", "Block", "Packed", "State", "added", "joined", "packed", "placed", "scores",
 ]  # fmt: skip
 
 # share of the log-likelihood that counts in a competition: of 0.5, 0.35 and 0.25, tried on linear sets of 39
 # development drives of two other simulators, 4, 2 and 1 names were wrong and sure, 20, 21 and 20 right (D)
 COARSE = 0.3
+# where unknown forms compete: they are no names, and what simulators err by along their coordinates is allowed for (D)
+COARSE_FORMS = 0.6
 SCALES = (1.0, 3.0)  # of the usual size: half of all deviations are three times as usual ones (K)
 
 

@@ -26,7 +26,7 @@ __all__ = ["Clear", "clear_forms", "described", "unknown_forms"]
 
 AHEAD = 3.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
-NEEDED = 6.0  # [nats] that the best set loses, with their prior, without forms of which each explains less
+NEEDED = 12.0  # [nats] that the best set loses, with their prior, without forms of which each explains less
 WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
 LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what is large, by the channel's unit
 ALIKE = 0.2  # share of the best one's probability from which the drive cannot distinguish another coordinate or axle
@@ -40,14 +40,15 @@ DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points
 class Clear(NamedTuple):
     """A mechanism that no known effect replaces: its blocks, `first` the most needed one, and its probability.
 
-    `instead`: mechanisms of its family that the drive cannot distinguish from it. `loss`: what the best set loses
-    without it [nats (natural logarithm)].
+    `instead`: mechanisms of its family that the drive cannot distinguish from it; `without`: their blocks in the best
+    set, which does as well with this one alone. `loss`: what the best set loses without it [nats (natural logarithm)].
     """
 
     own: tuple[int, ...]
     first: int
     probability: float
     instead: tuple[Mechanism, ...]
+    without: tuple[int, ...]
     loss: float
 
 
@@ -89,7 +90,8 @@ def clear_forms(
         for own in needed:
             first = min(own, key=lambda m: evidence((m,)))
             probability, instead = _of_mechanism(field, found, first, alike)
-            out.append(Clear(own, first, tempered(probability / max(len(alike), 1)), instead, lost[own]))
+            without = tuple(m for o in together if alike and o is not own for m in o)
+            out.append(Clear(own, first, tempered(probability / max(len(alike), 1)), instead, without, lost[own]))
     return sorted(out, key=lambda c: -c.loss)
 
 
@@ -118,14 +120,16 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     simulation differ by anyway. And no effect of the library may stand for it: a load of a fifth of the car looks like
     a torque that goes with the torque.
     """
-    fit = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
+    whole = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
 
-    def where(own: tuple[int, ...]) -> tuple[bool, float, str]:
-        return _where(arena, own, posterior.best, fit)
+    def shows(own: tuple[int, ...]) -> bool:
+        return _where(arena, own, posterior.best, whole)[1] > WORTH_TELLING
 
     found = []
-    for c in clear_forms(arena, posterior, posterior.tolerant, lambda own: where(own)[1] > WORTH_TELLING):
-        is_large, share, channel = where(c.own)
+    for c in clear_forms(arena, posterior, posterior.tolerant, shows):
+        members = [m for m in posterior.best if m not in c.without]
+        fit = fitted_in(arena.blocks, posterior.tolerant, members)
+        is_large, share, channel = _where(arena, c.own, members, fit)
         form = described(arena, posterior, posterior.gram, fit, c, channel, share, seed)
         is_large |= not form.manner and _surely(arena, fit, c.first, seed) >= WORTH * arena.mechanism(c.first).allowed
         if is_large and form.cosine <= SAME:
