@@ -12,7 +12,7 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 95_480
+MOST_LINES = 95_500
 MOST_FILES = 518
 MOST_TEST_LINES = 69_180
 MEDIAN_MODULE = 182
