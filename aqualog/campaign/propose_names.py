@@ -272,7 +272,7 @@ def _name_rest(rest: list[list[str]], told: list[dict[str, str]], rules: dict[st
             column, rule = f"x_{stems.pop()}", "number behind the same word"
             values = [re.sub(r"^\D+", "", v) for v in values]
         else:
-            column, rule = f"x_part{position + 1}", "a word that is not known, by its position"
+            column, rule = f"x_part{position + 1}", f"part {position + 1} of the name, not understood"
         while column in rules:
             column += "_"
         _note_rule(rules, column, rule)
