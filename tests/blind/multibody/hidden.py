@@ -378,19 +378,20 @@ _UNKNOWN = {
         _by("lean", a_y=0.04), _signal("a_y", lambda e, v: e._replace(lean=v["lean"])), "lateral", ("torque",),
         programmes=("city", "country", "staircase")),
     "garnet": _form(
-        _by("rate", all_=45.0), _odd("garnet", "rate", "threshold"), "force_balance", ("a_x",), programmes=LIVELY, signs=1,
+        _by("rate", all_=38.5), _odd("garnet", "rate", "threshold"), "force_balance", ("a_x",), programmes=LIVELY, signs=1,
         held_back=True, shape=lambda rng: {"threshold": rng.uniform(0.4, 0.9)}),
     "pyrite": _form(
         _by("force", all_=24.0), _odd("pyrite", "force", "up", "gap"), "force_balance", ("v_x",),
         programmes=("country", "staircase"), held_back=True,
         shape=lambda rng: {"up": rng.uniform(18.0, 23.0), "gap": rng.uniform(3.5, 6.0)}),
     "rutile": _form(
-        _by("depth", all_=0.1), _odd("rutile", "depth"), "slip", ("torque",), programmes=LIVELY, held_back=True),
+        _by("depth", all_=0.14), _odd("rutile", "depth"), "slip", ("torque",), programmes=("country", "staircase"),
+        held_back=True),
     "talc": _form(
         _by("rate", all_=0.08), _odd("talc", "rate"), "slip", ("v_x", "torque"), programmes=("country", "staircase"), signs=1,
         held_back=True),
     "topaz": _form(
-        _by("arm", a_x=0.4), _signal("a_x", lambda e, v: e._replace(arm=v["arm"])), "accelerometer", ("yaw_rate",),
+        _by("arm", a_x=0.5), _signal("a_x", lambda e, v: e._replace(arm=v["arm"])), "accelerometer", ("yaw_rate",),
         programmes=("city",), held_back=True),
 }  # fmt: skip
 
