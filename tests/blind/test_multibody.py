@@ -179,7 +179,7 @@ def test_kinds_are_the_contracts_and_forms_besides():
     assert set(known) == set(EFFECTS)
     assert not set(unknown) & set(EFFECTS)
     assert len(unknown) >= 10
-    assert len(HELD_BACK) == 6
+    assert len(HELD_BACK) == 5
     assert not set(HELD_BACK) & set(names_of(known=False))
     for name in known:
         for h in (draw(name, np.random.default_rng(s)) for s in range(6)):
@@ -201,10 +201,10 @@ def clean_messages(programme, seconds, *hidden):
 @pytest.mark.parametrize("name", KINDS)
 def test_every_kind_changes_its_drive(name):
     h = draw(name, np.random.default_rng(7))
-    late = {k: 4.0 for k in h.values if k == "start"}
+    late = {k: 4.0 for k in h.values if k in ("start", "up")}
     h = replace(h, values={**h.values, **late})
     off = replace(h, values={**h.values, **dict.fromkeys(KINDS[name].worth[h.where], KINDS[name].neutral)})
-    brakes = "time since braking" in KINDS[name].depends_on
+    brakes = {"time since braking", "a_x"} & set(KINDS[name].depends_on)
     seconds, programme = (60.0, "city") if brakes else (12.0, KINDS[name].programmes[0])
     seen = clean_messages(programme, seconds, h), clean_messages(programme, seconds)
     none = clean_messages(programme, seconds, off)
@@ -217,11 +217,12 @@ def test_every_kind_changes_its_drive(name):
 
 
 def test_odd_forces_are_where_they_say():
-    def force(name, t=10.0, share=0.5, v=20.0, way=0.0, steer=0.0, torque=300.0, a_side=0.0, yaw=0.0, **values):
+    def force(name, t=10.0, share=0.5, v=20.0, way=0.0, steer=0.0, torque=300.0, a_side=0.0, yaw=0.0, a_x=0.0, is_open=0.0,
+              **values):  # fmt: skip
         h = draw(name, np.random.default_rng(1))
         car, _ = car_of()
         setup = applied(Setup(car, NO_ODD, Place()), (replace(h, values={**h.values, **values}),))
-        return odd_force(t, share, v, way, steer, torque, a_side, yaw, setup.odd)
+        return odd_force(t, share, v, way, steer, torque, a_side, yaw, a_x, is_open, setup.odd)
 
     assert force("speed_hump", force=100.0, centre=20.0) == pytest.approx(100.0)
     assert force("passing_force", t=70.0, force=90.0, start=60.0, length=75.0) == pytest.approx(90.0)
@@ -240,6 +241,9 @@ def test_odd_forces_are_where_they_say():
     given = {"force": 50.0, "start": 60.0, "length": 70.0}
     at = [force("beryl", t=t, v=v, **given) for t, v in ((90.0, 30.0), (60.0, 20.0), (140.0, 20.0))]
     assert at == pytest.approx([112.5, 25.0, 0.0], abs=1e-3)
+    at = [force("garnet", a_x=a, rate=100.0, threshold=0.5) for a in (-2.5, -0.5, 1.0)]
+    assert at == pytest.approx([200.0, 0.0, 0.0])
+    assert [force("pyrite", v=v, is_open=o, force=40.0) for v, o in ((30.0, 1.0), (30.0, 0.0))] == [90.0, 0.0]
 
 
 def test_odd_tyres_and_sensors_are_where_they_say():
@@ -256,13 +260,23 @@ def test_odd_tyres_and_sensors_are_where_they_say():
     for hidden, by, at, near, expected in (
         (band, "v_x", (13.0, 18.0, 20.0, 28.0), 0.3, [1.0, 1.0 - 0.4 * np.exp(-0.5), 0.6, 1.0]),
         (place, "way", (50.0, 150.0), 2.0, [0.6, 1.0]),
+        (Hidden("rutile", None, {"depth": -0.3}), "slip", (0.005, -0.005), 0.002, [1.0, 1.3]),
+        (Hidden("talc", None, {"rate": 0.3}), "kW", (3.0, 9.0), 0.5, [1.0 / 1.09, 1.0 / 1.27]),
     ):
         slope = []
         for odd in (applied(Setup(car, NO_ODD, Place()), (hidden,)).odd, NO_ODD):
-            x = ride(car, np.linspace(10.0, 32.0, 1300), odd=odd)
+            x = ride(car, np.concatenate([np.linspace(10.0, 32.0, 1300), np.linspace(32.0, 20.0, 400)]), odd=odd)
+            x |= {n: np.mean([x[f"{n}_{w}"] for w in driven], axis=0) for n in ("slip", "torque")}
+            x["kW"] = x["torque"] * x["v_x"] / 1e3
             stiff = np.mean([x[f"force_{w}"] / (x[f"load_{w}"] * x[f"slip_{w}"]) for w in driven], axis=0)
             slope.append([np.median(stiff[np.abs(x[by] - here) < near]) for here in at])
         assert np.divide(*slope) == pytest.approx(expected, rel=0.04)
+
+    odd = applied(Setup(car, NO_ODD, Place()), (Hidden("pyrite", None, {"force": 600.0, "up": 22.0, "gap": 8.0}),)).odd
+    x = ride(car, np.concatenate([np.linspace(10.0, 28.0, 1000), np.linspace(28.0, 10.0, 1200)]), odd=odd)
+    F = sum(x[f"force_{w}"] for w in WHEELS) - car.mass * np.gradient(x["v_x"], DT)
+    near, top = np.abs(x["v_x"] - 18.0) < 0.5, x["v_x"].argmax()
+    assert F[top:][near[top:]].mean() - F[:top][near[:top]].mean() == pytest.approx(600.0 * 0.81, rel=0.1)
 
     def seen(*hidden):
         return {s: x for m in clean_messages("country", 20.0, *hidden) for s, x in m.columns.items()}
@@ -286,6 +300,8 @@ def test_odd_tyres_and_sensors_are_where_they_say():
     added = seen(Hidden("olivine", "a_y", {"lean": 0.2}))["a_y"] - true["a_y"]
     pull = sum(x for s, x in true.items() if s.startswith("torque"))
     assert added == pytest.approx(0.2e-3 * np.maximum(pull, 0.0), rel=0.02, abs=1e-4)
+    added = seen(Hidden("topaz", "a_x", {"arm": 2.0}))["a_x"] - true["a_x"]
+    assert added == pytest.approx(-2.0 * true["yaw_rate"] ** 2, abs=1e-9)
     tilt = Hidden("zircon", None, {"angle": 0.01, "time": 9.0})
     late, none = (clean_messages("city", 60.0, *h)[0].columns["a_x"] for h in ((tilt,), ()))
     after = (late - none)[np.argmax(late - none) :]
@@ -308,6 +324,10 @@ def test_points_are_a_form_as_a_diagnosis_has_it():
     _, found, x, f = points("yawing_slip", rate=5.0)
     assert found["slip_r"] == pytest.approx(1.0 / (1.0 + 5.0 * np.abs(x)) - 1.0, abs=1e-4)
     assert not any(found["slip_f"])
+    _, found, x, f = points("rutile", depth=0.4)
+    assert np.interp([0.0, 999.0], x, f) == pytest.approx([-0.2, 0.0], abs=0.01)
+    _, found, x, f = points("garnet", rate=50.0, threshold=0.8)
+    assert f == pytest.approx(50.0 * np.maximum(-0.8 - x, 0.0), abs=0.01)
     car, found, x, f = points("torque_read_in_speed", rate=0.03)
     slip = 200.0 / (car.r_e[2] * car.slope[2] * car.static[2])  # of a rear wheel with 200 N m
     there = np.interp(400.0 / car.split_rear, x, found["slip_r"])

@@ -117,6 +117,10 @@ class Odd(NamedTuple):
     galena: np.ndarray = np.array([0.0, 300.0, 0.0])  # share of the slope, m, rad
     jasper: np.ndarray = np.array([0.0, 0.0, 1.0, 0.7, 0.2])  # relative, wheel, side of the bend, m/s^2, m/s^2
     zircon: np.ndarray = np.array([0.0])  # rad
+    garnet: np.ndarray = np.array([0.0, 0.6])  # N s^2/m, m/s^2
+    pyrite: np.ndarray = np.array([0.0, 20.0, 5.0])  # N at 20 m/s, m/s, m/s
+    rutile: np.ndarray = np.array([0.0])  # share of the slope
+    talc: np.ndarray = np.array([0.0])  # 1/(kN m (10 m/s))
 
 
 NO_ODD = Odd()

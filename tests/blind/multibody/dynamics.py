@@ -18,8 +18,9 @@ ZU, ZU_RATE, RIM, BELT, TORSION, BRISTLE_X, BRISTLE_Y, ANGLE = 10, 14, 18, 22, 2
 ENGINE, SHAFT = 42, 44
 STATES = 46
 # besides: specific force along and across, and by wheel the torque of shafts, load, slip, film, lost share, force along
-A_X, A_Y, T_SHAFT, LOAD, SLIP, FILM, LOST, FORCE = 0, 1, 2, 6, 10, 14, 18, 22
-AUX = 26
+# and what is open
+A_X, A_Y, T_SHAFT, LOAD, SLIP, FILM, LOST, FORCE, OPEN = 0, 1, 2, 6, 10, 14, 18, 22, 26
+AUX = 27
 GRADE, BANK, FILM_L, FILM_R = range(4)  # columns of the slow road, every metre
 FINE, COARSE = 0.1, 1.0  # [m] steps of the uneven and of the slow road
 
@@ -44,7 +45,7 @@ def _bell(x, centre, width):
 
 
 @compiled
-def odd_force(t, share, v, way, steer, torque, a_side, yaw, odd):
+def odd_force(t, share, v, way, steer, torque, a_side, yaw, a_x, is_open, odd):
     """Forces against the motion that no effect has [N]; `share` of the drive that is over, `torque` of all shafts."""
     F = 0.0
     if odd.hump[0] != 0.0:
@@ -68,6 +69,9 @@ def odd_force(t, share, v, way, steer, torque, a_side, yaw, odd):
     if odd.beryl[0] != 0.0:
         on = tanh(t - odd.beryl[1]) - tanh(t - odd.beryl[1] - odd.beryl[2])
         F += odd.beryl[0] * (v / 20.0) ** 2 * 0.5 * on
+    if odd.garnet[0] != 0.0:
+        F += odd.garnet[0] * max(-a_x - odd.garnet[1], 0.0)
+    F += odd.pyrite[0] * (v / 20.0) ** 2 * is_open
     return F * tanh(v / 0.5)
 
 
@@ -124,11 +128,11 @@ def _driveline(y, f, aux, drive, gear, p):
 def _slope(i, t, y, aux, leak, lost, p, odd, linger):
     slope = p.slope[i] * load_factor(aux[LOAD + i], p.load_ref[i], p.load_law[i])
     slope *= exp(p.slope_drift[i] * t) * (1.0 + p.leak_slope[i] * leak) * (1.0 - lost) ** p.law[9]
-    return slope * odd_slope(i, aux[T_SHAFT + i], y[YAW], y[VX], y[WAY], linger, odd)
+    return slope * odd_slope(i, aux[T_SHAFT + i], y[YAW], y[VX], y[WAY], linger, aux[SLIP + i], odd)
 
 
 @compiled
-def odd_slope(i, torque, yaw, v, way, linger, odd):
+def odd_slope(i, torque, yaw, v, way, linger, slip, odd):
     """Factor on the slope of wheel i that no effect has; `torque` of its shaft."""
     factor = 1.0 - odd.soft[0] * linger
     if odd.saddle[0] != 0.0:
@@ -140,7 +144,9 @@ def odd_slope(i, torque, yaw, v, way, linger, odd):
     if odd.galena[0] != 0.0:  # patches of two lengths
         x = 2.0 * pi * way / odd.galena[1] + odd.galena[2]
         factor *= 1.0 - odd.galena[0] * 0.5 * (1.0 + tanh(6.0 * (sin(x) + sin(0.618 * x) - 0.3)))
-    return factor
+    if odd.rutile[0] != 0.0:
+        factor *= 1.0 - odd.rutile[0] * 0.5 * (1.0 - tanh(slip / 4e-4))
+    return factor / (1.0 + odd.talc[0] * abs(torque) * v / 1e4)
 
 
 @compiled
@@ -214,7 +220,11 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
     a_side = sum_y / p.mass
     resist += p.corner_drag * p.mass * a_side * a_side
     torque = aux[T_SHAFT] + aux[T_SHAFT + 1] + aux[T_SHAFT + 2] + aux[T_SHAFT + 3]
-    resist += odd_force(t, share, v, way, steer, torque, a_side, yaw, odd)
+    if v > odd.pyrite[1]:
+        aux[OPEN] = 1.0
+    elif v < odd.pyrite[1] - odd.pyrite[2]:
+        aux[OPEN] = 0.0
+    resist += odd_force(t, share, v, way, steer, torque, a_side, yaw, aux[A_X], aux[OPEN], odd)
     a_x = (sum_x - resist) / (p.mass + p.towed)
     f[VX] = a_x - G * sin(grade) + yaw * v_y
     f[VY] = a_side - G * sin(bank) - yaw * v

@@ -52,11 +52,12 @@ def _range(coordinate: str, drive: Sequence[Message]) -> tuple[float, float]:
 
 def _force(coordinate: str) -> Function:
     at = {"t": 0.0, "share": 0.5, "v": 20.0, "way": 0.0, "steer": 0.0, "torque": 0.0, "a_side": 0.0, "yaw": 0.0}
+    at |= {"a_x": 0.0, "is_open": 0.0}
     return lambda s, x, _: np.array([odd_force(*(at | {coordinate: y}).values(), s.odd) for y in x])
 
 
 def _slope(coordinate: str) -> Function:
-    at = {"torque": 0.0, "yaw": 0.0, "v": 20.0, "way": 0.0, "linger": 0.0}
+    at = {"torque": 0.0, "yaw": 0.0, "v": 20.0, "way": 0.0, "linger": 0.0, "slip": 0.0}
     return lambda s, x, i: np.array([odd_slope(i, *(at | {coordinate: y}).values(), s.odd) - 1.0 for y in x])
 
 
@@ -83,16 +84,20 @@ def _read(s: Setup, total: np.ndarray) -> np.ndarray:
 
 FUNCTIONS: Mapping[str, Function] = {
     "speed_hump": _force("v"), "steering_drag": _force("steer"), "basalt": _force("a_side"), "agate": _force("yaw"),
+    "garnet": _force("a_x"),
     "odd_hours": lambda s, x, i: _force("share")(s, x / x[-1], i),
     "lingering_brake": lambda s, x, _: 2.0 * s.odd.linger[0] / s.car.r_e[2] * np.exp(-x / s.odd.linger[1]),
     "gneiss": _slope("v"), "yawing_slip": _slope("yaw"),
     "slate": lambda s, x, i: _slope("linger")(s, np.exp(-x / s.odd.linger[1]), i),
     "torque_saddle": lambda s, x, i: _slope("torque")(s, _torques(s, x)[0][i], i),
+    "rutile": lambda s, x, i: _slope("slip")(
+        s, _torques(s, x)[1][i] / (s.car.r_e[i] * s.car.slope[i] * s.car.static[i]), i),
     "torque_read_in_speed": _read_in_speed, "chalk": lambda s, x, _: (_read(s, x) - x) / s.car.r_e.mean(),
     "speed_dependent_gain": lambda s, x, _: misread(1.0, s.errors["a_x"], x) - 1.0,
     "feldspar": lambda s, x, _: misread(x, s.errors["a_x"], 15.0) - x,
     "dolomite": lambda s, x, _: misread(0.0, s.errors["a_y"], x),
     "olivine": lambda s, x, _: misread(0.0, s.errors["a_y"], 15.0, x),
+    "topaz": lambda s, x, _: misread(0.0, s.errors["a_x"], 15.0, 0.0, x),
     # less what the sensor takes for its own pitch
     "zircon": lambda s, x, _: G * s.odd.zircon[0] * np.exp(-x / s.odd.linger[1]) / (1.0 + G * gradients(s.car)[0]),
 }  # fmt: skip

@@ -358,25 +358,41 @@ _UNKNOWN = {
         shape=lambda rng: {"period": rng.uniform(22.0, 40.0), "phase": rng.uniform(0.0, 6.28)}),
     "agate": _form(
         _by("force", all_=20.0), _odd("agate", "force", "knee"), "force_balance", ("yaw_rate",), programmes=("city", "country"),
-        signs=1, held_back=True, shape=lambda rng: {"knee": rng.uniform(0.06, 0.12)}),
+        signs=1, shape=lambda rng: {"knee": rng.uniform(0.06, 0.12)}),
     "beryl": _form(
         _by("force", all_=8.0), _odd("beryl", "force", "start", "length"), "force_balance", ("time", "v_x"),
-        programmes=("country", "motorway", "staircase", "coast_down"), held_back=True,
+        programmes=("country", "motorway", "staircase", "coast_down"),
         shape=lambda rng: {"start": rng.uniform(50.0, 120.0), "length": rng.uniform(60.0, 110.0)}),
     "galena": _form(
         _by("depth", all_=0.12), _odd("galena", "depth", "period", "phase"), "slip", ("position",), programmes=LIVELY, signs=1,
-        on_the_road=True, held_back=True,
+        on_the_road=True,
         shape=lambda rng: {"period": rng.uniform(250.0, 500.0), "phase": rng.uniform(0.0, 6.28)}),
     "jasper": _form(
         {w: {"depth": 8e-4} for w in WHEELS}, _odd("jasper", "depth", "wheel", "side", "threshold", "width"), "slip", ("a_y",),
-        programmes=("city", "country"), signs=1, held_back=True, shape=lambda rng: {
+        programmes=("city", "country"), signs=1, shape=lambda rng: {
             "side": float(rng.choice([-1, 1])), "threshold": rng.uniform(0.5, 0.8), "width": rng.uniform(0.15, 0.3)}),
     "zircon": _form(
         _by("angle", all_=0.0013), _lingering("zircon", "angle"), "accelerometer", ("time since braking",),
-        programmes=LIVELY, held_back=True, shape=lambda rng: {"time": rng.uniform(8.0, 18.0)}),
+        programmes=LIVELY, shape=lambda rng: {"time": rng.uniform(8.0, 18.0)}),
     "olivine": _form(
         _by("lean", a_y=0.04), _signal("a_y", lambda e, v: e._replace(lean=v["lean"])), "lateral", ("torque",),
-        programmes=("city", "country", "staircase"), held_back=True),
+        programmes=("city", "country", "staircase")),
+    "garnet": _form(
+        _by("rate", all_=38.5), _odd("garnet", "rate", "threshold"), "force_balance", ("a_x",), programmes=LIVELY, signs=1,
+        held_back=True, shape=lambda rng: {"threshold": rng.uniform(0.4, 0.9)}),
+    "pyrite": _form(
+        _by("force", all_=24.0), _odd("pyrite", "force", "up", "gap"), "force_balance", ("v_x",),
+        programmes=("country", "staircase"), held_back=True,
+        shape=lambda rng: {"up": rng.uniform(18.0, 23.0), "gap": rng.uniform(3.5, 6.0)}),
+    "rutile": _form(
+        _by("depth", all_=0.14), _odd("rutile", "depth"), "slip", ("torque",), programmes=("country", "staircase"),
+        held_back=True),
+    "talc": _form(
+        _by("rate", all_=0.08), _odd("talc", "rate"), "slip", ("v_x", "torque"), programmes=("country", "staircase"), signs=1,
+        held_back=True),
+    "topaz": _form(
+        _by("arm", a_x=0.5), _signal("a_x", lambda e, v: e._replace(arm=v["arm"])), "accelerometer", ("yaw_rate",),
+        programmes=("city",), held_back=True),
 }  # fmt: skip
 
 KINDS: Mapping[str, Kind] = {**_KNOWN, **_UNKNOWN}

@@ -58,6 +58,7 @@ class Error(NamedTuple):
     `shake`: added at a speed [m/s], half of it so much beside that [m/s]. `tip`: added with the sign of the lateral
     acceleration that was last beyond so much [m/s^2]. `dead`: of the signal, below which it is hardly read.
     `pulse`: relative, up and down over a period [s] from a phase on [rad]. `lean`: added per kN m of all pull.
+    `arm`: taken off per square of the yaw rate [m].
     """
 
     gain: float = 1.0
@@ -74,6 +75,7 @@ class Error(NamedTuple):
     dead: float = 0.0
     pulse: tuple[float, float, float] = (0.0, 30.0, 0.0)
     lean: float = 0.0
+    arm: float = 0.0
 
 
 class Message(NamedTuple):
@@ -138,9 +140,9 @@ def _messages(rows, car, errors, noise, rng):
             stem = symbol.split("_")[0]
             e = errors.get(symbol, Error())
             x = truth[symbol] * (slow if stem == "torque" else 1.0)
-            v = rows[:, ROWS["v_x"]]
+            v, yaw = rows[:, ROWS["v_x"]], rows[:, ROWS["yaw_rate"]]
             torque = rows[:, ROWS["torque_fl"] :][:, :4].sum(axis=1)
-            x = misread(x, e, v, torque) + e.tip[0] * _last_side(rows[:, ROWS["a_y"]], e.tip[1])
+            x = misread(x, e, v, torque, yaw) + e.tip[0] * _last_side(rows[:, ROWS["a_y"]], e.tip[1])
             if e.dead != 0.0:
                 x = hardly_read(x, e.dead)
             x = x * (1.0 + e.pulse[0] * np.tanh(3.0 * np.sin(2.0 * np.pi * middle / e.pulse[1] + e.pulse[2])))
@@ -159,11 +161,11 @@ def _messages(rows, car, errors, noise, rng):
     return out
 
 
-def misread(x, e, v, torque=0.0):
-    """A signal as its error has it by the speed, by its own square and by the torque of all wheels."""
+def misread(x, e, v, torque=0.0, yaw=0.0):
+    """A signal as its error has it by the speed, by its own square, by the torque of all wheels and by the yaw rate."""
     x = x * (1.0 + e.by_speed * (v - 15.0)) + e.square * x * x
     x = x + e.shake[0] / (1.0 + ((v - e.shake[1]) / e.shake[2]) ** 2)
-    return x + e.lean * np.maximum(torque / 1e3, 0.0)
+    return x + e.lean * np.maximum(torque / 1e3, 0.0) - e.arm * yaw * yaw
 
 
 def hardly_read(x, dead):
