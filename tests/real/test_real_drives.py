@@ -140,7 +140,7 @@ def test_porsche_lock_ups_are_folded(porsche):
     assert found["wheel_lock"] > 10 * (found["suspected"] + 1)
     text = report_text(drive_report(result))
     assert len(text.splitlines()) < 45
-    assert "Wheel lock: " in text
+    assert "Braking slip: " in text
 
 
 def test_porsche_gps_clock(real_logs):
