@@ -223,7 +223,8 @@ def _episode(group: Sequence[_Numbered], way: Stretch, span: tuple[float, float]
         "full" if any(e.severity == "full" for e in joint or events) else "partial",
         metres / seconds if seconds > 0.0 else math.nan, tuple(dict.fromkeys(decided)),
         max(_known(events, "delta_a_x_max"), default=math.nan), min(_known(events, "slip_min"), default=math.nan),
-        max(_known(events, "slip_max"), default=math.nan),
+        # a drop of the slip slope has amounts of slip there, without their sign
+        max(_known((e for e in events if e.detector in _WHEELS), "slip_max"), default=math.nan),
         metres if seconds > 0.0 else math.nan, tuple(sorted(i for i, _ in group)),
     )  # fmt: skip
 

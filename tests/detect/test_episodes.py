@@ -33,14 +33,15 @@ LANE = (
 
 
 def test_one_pass_is_one_episode_with_all_that_is_known_of_it():
-    (e,) = episodes_of(LANE, way)
+    # a drop of the slip slope has an amount of slip without a sign
+    (e,) = episodes_of([*LANE, event("slip_slope_drop", 9.1, 9.2, "fl", slip_max=0.5)], way)
     assert (e.kind, e.start_s, e.end_s, e.severity) == ("aquaplaning", 8.2, 17.7, "partial")
     assert (e.wheels, e.axle, e.side) == (("fr", "fl"), "f", None)
     assert e.decided_by == ("minor_spin_down", "resistance")
     assert (e.delta_a_x_max, e.slip_min, e.slip_max) == (1.1, -0.2, 0.31)
     assert e.v_x == pytest.approx(28.0)
     assert e.distance_m == pytest.approx(28.0 * 9.5)
-    assert e.events == (0, 1, 2, 3, 4)
+    assert e.events == (0, 1, 2, 3, 4, 5)
 
 
 def test_less_than_a_second_between_detections_joins_them():

@@ -17,9 +17,7 @@ __all__ = [
 ]  # fmt: skip
 
 WORSE = 0.01  # rise of a channel's error that is reported
-FAR_OFF = (
-    0.5  # [m/s^2] error of an acceleration that is reported although nothing explains it: five times an offset (V, ESC)
-)
+FAR_OFF = 0.5  # [m/s^2] error of an acceleration that is said though nothing explains it: five offsets (V, ESC)
 _VERDICTS = {
     "no_effect": "No effect is missing",
     "named": "One cause",
@@ -299,14 +297,7 @@ def _consequence(c: Mapping[str, Any]) -> str:
 def _manoeuvre(m: Mapping[str, Any] | None) -> list[str]:
     if m is None:
         return []
-    if m["sentence"]:
-        return [m["sentence"]]  # which has both probabilities
-    said = [f"{upper_first(m['name'].replace('_', ' '))}."]
-    if m["p_correct_now"] is None or m["p_correct_then"] is None or m["name"] in ("none", "sensor"):
-        return said
-    lasting = f", {short(m['minutes'])} min" if m["minutes"] else ""
-    now, then = percent(m["p_correct_now"]), percent(m["p_correct_then"])
-    return [*said, f"Probability of the right name: {now} now, {then} afterwards{lasting}."]
+    return [m["sentence"] or f"{upper_first(m['name'].replace('_', ' '))}."]
 
 
 def mechanism_title(r: Mapping[str, Any]) -> str:

@@ -23,7 +23,7 @@ from aqualog.report.campaign.answers import answers_of, verdicts
 from aqualog.report.campaign.findings import Curve, Point, crossing, find
 from aqualog.report.campaign.folder import MARK, check_folder, page_names, write_report
 from aqualog.report.campaign.labels import file_name, group_text, value_text
-from aqualog.report.campaign.page import campaign_page
+from aqualog.report.campaign.page import _quality_line, campaign_page
 from aqualog.report.campaign.quality import MOST_KINDS, problems_of
 from aqualog.report.campaign.run_page import command_of, facts_of, run_page
 from aqualog.report.values import cut
@@ -57,6 +57,8 @@ def test_quality_names_the_bad_log_first(page, case):
     assert "bad.mf4" in runs[0][1]
     few = [p for p in problems_of(case, ("tyre", "water_depth_mm")) if "fewer than 3" in p.title]
     assert [i for p in few for i, _ in p.runs] == [EVIL]
+    two = (replace(few[0], weight="limit"), replace(few[0], weight="limit", title="another"))
+    assert _quality_line(two).startswith("1 run with limits")
 
 
 def test_notes_that_differ_in_numbers_are_one_kind(case):

@@ -57,6 +57,8 @@ def test_what_the_page_tells_changes_with_the_document():
         (d["next_manoeuvre"], "sentence", "Weigh it in 7.25 min.", "Weigh it in 7.25 min."),
         (d["significance"], "achieved_level", 0.0444, "achieved 0.0444"),
         (d["limits"][0], "size", 17.0, "17 kg"),
+        (d["limits"][1], "size", 0.47, "47 %"),
+        (d["gain"]["channel"]["kinematic"], "rmse_after", 0.77, "speed stays 0.77 m/s² off"),
         (d["untested"], "relaxation_length", "because of 11", "because of 11"),
         (d["causes"][1]["parameters"]["gain"], "value", 0.8777, "0.878"),
     ):
