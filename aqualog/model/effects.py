@@ -312,6 +312,16 @@ _ALL = [
         drive=DriveSearch(places=_PAIR), belongs="drive",
     ),
     Effect(
+        "accelerometer_position", "place of the accelerometer [m]",
+        "The accelerometer sits {ahead:.2f} m ahead of the centre of gravity.",
+        "on the tunnel -0.3 to +0.5 m, a logger in the boot -2 m (K)",
+        (Parameter("ahead", "m", 0.0, 0.7, -5.0, 5.0, 0.3, "ahead of the centre of gravity positive"),),
+        # sought in a_x alone: simulated a_y errs with the yaw acceleration by more than the place adds
+        _on_channels(lambda c, v: replace(c, ahead=c.ahead + v["ahead"])), _PAIR, "a_x",
+        drive=DriveSearch(places=("a_x",), tolerance=0.2),
+        less="The accelerometer sits {ahead:.2f} m behind the centre of gravity.",
+    ),
+    Effect(
         "signal_delay", "delay of a signal [s]", "The signal comes {delay:.3f} s late.", "GNSS up to 0.5 s (V)",
         (Parameter("delay", "s", 0.0, 0.1, -1.0, 2.0, 0.01, "late positive"),),
         _on_channels(lambda c, v: replace(c, delay_s=c.delay_s + v["delay"])), _SIGNALS, "v_x", twins=("clock_skew",),

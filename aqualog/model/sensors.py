@@ -51,7 +51,9 @@ class Channel:
     `noise` rms; `resolution` step of the bus signal; `lag_s` first-order low-pass; `latency_s` value sampled at t bears
     the stamp t + latency; `gain_spread`, `offset_spread`, `drift_spread` [1/s]: rms of the random values of a run.
     `gain`, `bias`, `drift` [1/s] and `delay_s` are set, not random: terms of a model act on them. `pitching` [s²]: what
-    the rate of `a_x` adds, as an antenna on the roof of a car that pitches has it for the velocity.
+    the rate of `a_x` adds, as an antenna on the roof of a car that pitches has it for the velocity. `ahead` [m]: how
+    far an accelerometer sits ahead of the centre of gravity. With the yaw rate r it adds -ahead r^2 to a_x and
+    ahead dr/dt to a_y.
     """
 
     noise: float = 0.0
@@ -66,6 +68,7 @@ class Channel:
     drift: float = 0.0
     delay_s: float = 0.0
     pitching: float = 0.0
+    ahead: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,9 +201,12 @@ def _rolling(truth: Truth, sensors: Sensors, name: str, seed: int) -> FloatArray
     """Return a column of the truth at the place of its sensor; a wheel speed with the error of its tone ring, in the
     same phase as with teeth."""
     x = _column(truth, name)
-    pitching = sensors.channels.get(name, Channel()).pitching
-    if pitching != 0.0:
-        x = x + pitching * np.gradient(_column(truth, "a_x"), _step(truth))
+    channel = sensors.channels.get(name, Channel())
+    if channel.pitching != 0.0:
+        x = x + channel.pitching * np.gradient(_column(truth, "a_x"), _step(truth))
+    if channel.ahead != 0.0:
+        yaw_rate = _column(truth, "yaw_rate")
+        x = x + channel.ahead * (-(yaw_rate**2) if name == "a_x" else np.gradient(yaw_rate, _step(truth)))
     amplitude = sensors.tone_ring[_OMEGA[name]] if name in _OMEGA else 0.0
     if amplitude == 0.0:
         return x
