@@ -28,8 +28,8 @@ from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
 
 __all__ = [
-    "CHUNK", "SHAPE_PRIOR", "Arena", "Field", "Part", "arena_of", "blocks_of", "competing", "known_only", "make_arena",
-    "products", "unit_force",
+    "CHUNK", "SHAPE_PRIOR", "TOLERATED", "Arena", "Field", "Part", "arena_of", "blocks_of", "competing", "known_only",
+    "make_arena", "products", "unit_force",
 ]  # fmt: skip
 
 # of an effect at any place, of a shape of a mechanism, and of a road that is not even, on one drive (K)

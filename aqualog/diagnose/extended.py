@@ -109,7 +109,10 @@ def _undo_sensors(measured: _Measured, sensors: Sensors) -> None:
     t, columns = measured.t, measured.columns
     for name, c in sensors.channels.items():
         if c != Channel() and name in columns:
-            columns[name] = (columns[name] - c.bias - c.drift * t) / c.gain
+            turned = (
+                c.ahead * np.nan_to_num(columns["yaw_rate"]) ** 2 if c.ahead != 0.0 and "yaw_rate" in columns else 0.0
+            )
+            columns[name] = (columns[name] - c.bias - c.drift * t) / c.gain + turned
     skew = {name: g.skew_ppm for g in sensors.groups for name in g.signals if g.skew_ppm != 0.0}
     late = {name: c.delay_s for name, c in sensors.channels.items() if c.delay_s != 0.0}
     for name in {**skew, **late}.keys() & columns.keys():
@@ -129,6 +132,8 @@ def _notes(term: Term, base: Setup, measured: _Measured) -> list[str]:
         n for b, a in zip(base.sensors.groups, after.sensors.groups, strict=True) if a != b for n in a.signals
     }  # fmt: skip
     if acts_on:
+        if "ahead" in term.values and "yaw_rate" not in measured.columns:
+            return [f"{name}: the log has no yaw_rate; not used"]
         return [] if acts_on & measured.columns.keys() else [f"{name}: the log has no {term.place}; not used"]
     unused = changed - _VEHICLE - _SIGNAL - _SILENT
     if not changed & (_VEHICLE | _SIGNAL):

@@ -358,15 +358,14 @@ def _is_same(a: Drive, b: Drive) -> bool:
 def accelerometer_defect(drive: Drive) -> Follow | None:
     """Whether `a_x` is the car's longitudinal acceleration: its changes over 2 s against those of dv/dt.
 
-    None if it is, or if the speed changes too little for a judgement.
+    Braked stretches count, too, in which the torque says nothing: the car moves most there. None if it is, or if the
+    speed changes too little for a judgement.
     """
     if "a_x" not in drive.columns:
         return None
-    used = np.repeat(drive.mask, max(1, round(0.1 / drive.dt)) if drive.dt < 0.1 else 1)
     # not the course's target: it leads the simulation of a car that is heavier than its file by more than the speed
     a, v = drive.columns["a_x"], drive.speed
-    n = min(used.size, a.size)
-    found = follow(a[:n], v[:n], used[:n], drive.dt)
+    found = follow(a, v, np.isfinite(a) & np.isfinite(v), drive.dt)
     if found is None or found.motion < LEAST_MOTION:
         return None
     wrong = found.correlation < LEAST_CORRELATION or not LEAST_GAIN <= found.gain <= MOST_GAIN

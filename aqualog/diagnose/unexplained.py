@@ -11,14 +11,14 @@ import numpy as np
 
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.diagnose.arena import Arena, Field
+from aqualog.diagnose.arena import TOLERATED, Arena, Field
 from aqualog.diagnose.channels import CHANNELS, contrasts
 from aqualog.diagnose.compete import Fitted, Posterior
 from aqualog.diagnose.competition import Block
 from aqualog.diagnose.hypotheses import WORTH
 from aqualog.diagnose.records import SURE, Remainder, tempered
 from aqualog.diagnose.sets import Sets, evidence_of, fitted_in
-from aqualog.diagnose.shapes import Mechanism
+from aqualog.diagnose.shapes import ALONG, Mechanism
 from aqualog.diagnose.unknown_term import ALIKE as SAME
 from aqualog.diagnose.unknown_term import describe
 
@@ -30,6 +30,7 @@ NEEDED = 12.0  # [nats] that the best set loses, with their prior, without forms
 WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
 LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what is large, by the channel's unit
 ALIKE = 0.2  # share of the best one's probability from which the drive cannot distinguish another coordinate or axle
+ERRS = frozenset({*TOLERATED, "since_braking", *ALONG})  # coordinates along which simulators have offsets
 _SLIPS = tuple(f"slip_{w}" for w in WHEELS)
 # most that is said of a form: what the library of forms lacks looks like another one. Of 59 that stood first with 0.95
 # and more on sealed drives 48 were right in mechanism and coordinate, of kinds that nobody had seen 5 of 15 (S)
@@ -159,8 +160,9 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
 
     The share is of what the others of the set leave. Between axles and sides the reference velocity's noise, which is
     in the slip of all wheels, cancels. What the wheels do must show in their slip: a simulator's error in fast
-    movements is in other channels. A smooth function must explain some of the variance where half of its energy is,
-    too: else it is an offset in one kind of driving, as simulators have it when a car brakes to a stop.
+    movements is in other channels. A smooth function of speed, torque or braking must explain some of the variance
+    where half of its energy is, too: else it is an offset in one kind of driving, as simulators have it when a car
+    brakes to a stop.
     """
     channels = arena.parts[0].channels
     names, turned = _with_differences(channels)
@@ -173,7 +175,8 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
     y, f = np.concatenate(left, axis=1), np.concatenate(made, axis=1)
     share = _share(y, f, np.ones_like(f))
     rms = np.sqrt((f**2).mean(axis=1))
-    if not any(arena.shapes[arena.blocks[m].tag].manner for m in members):
+    own = [arena.shapes[arena.blocks[m].tag] for m in members]
+    if not any(s.manner for s in own) and any(ERRS.intersection(s.coordinates) for s in own):
         share = np.where(_share(y, f, np.abs(f) >= _most(f)) > 0.0, share, 0.0)
     large = [bool(r > LEAST[CHANNELS[c].unit] and s > WORTH_TELLING) for r, s, c in zip(rms, share, names, strict=True)]
     of_wheels = arena.mechanism(members[0]).name.startswith(("slip", "radius"))

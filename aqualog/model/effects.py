@@ -316,8 +316,7 @@ _ALL = [
         "The accelerometer sits {ahead:.2f} m ahead of the centre of gravity.",
         "on the tunnel -0.3 to +0.5 m, a logger in the boot -2 m (K)",
         (Parameter("ahead", "m", 0.0, 0.7, -5.0, 5.0, 0.3, "ahead of the centre of gravity positive"),),
-        # sought in a_x alone: simulated a_y errs with the yaw acceleration by more than the place adds
-        _on_channels(lambda c, v: replace(c, ahead=c.ahead + v["ahead"])), _PAIR, "a_x",
+        _on_channels(lambda c, v: replace(c, ahead=c.ahead + v["ahead"])), ("a_x",), "a_x",
         drive=DriveSearch(places=("a_x",), tolerance=0.2),
         less="The accelerometer sits {ahead:.2f} m behind the centre of gravity.",
     ),

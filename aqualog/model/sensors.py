@@ -52,8 +52,7 @@ class Channel:
     the stamp t + latency; `gain_spread`, `offset_spread`, `drift_spread` [1/s]: rms of the random values of a run.
     `gain`, `bias`, `drift` [1/s] and `delay_s` are set, not random: terms of a model act on them. `pitching` [s²]: what
     the rate of `a_x` adds, as an antenna on the roof of a car that pitches has it for the velocity. `ahead` [m]: how
-    far an accelerometer sits ahead of the centre of gravity. With the yaw rate r it adds -ahead r^2 to a_x and
-    ahead dr/dt to a_y.
+    far the accelerometer sits ahead of the centre of gravity: its a_x has -ahead r^2 besides, with the yaw rate r.
     """
 
     noise: float = 0.0
@@ -205,8 +204,7 @@ def _rolling(truth: Truth, sensors: Sensors, name: str, seed: int) -> FloatArray
     if channel.pitching != 0.0:
         x = x + channel.pitching * np.gradient(_column(truth, "a_x"), _step(truth))
     if channel.ahead != 0.0:
-        yaw_rate = _column(truth, "yaw_rate")
-        x = x + channel.ahead * (-(yaw_rate**2) if name == "a_x" else np.gradient(yaw_rate, _step(truth)))
+        x = x - channel.ahead * _column(truth, "yaw_rate") ** 2
     amplitude = sensors.tone_ring[_OMEGA[name]] if name in _OMEGA else 0.0
     if amplitude == 0.0:
         return x

@@ -109,8 +109,12 @@ def test_a_force_over_speed_leaves_the_balance_of_forces(base):
     assert left < 0.15 * off
 
 
-def test_curves_cost_what_the_model_says():
-    m = model("cornering_drag", coefficient=0.03)
+@pytest.mark.parametrize(
+    ("effect", "where", "values"),
+    [("cornering_drag", None, {"coefficient": 0.03}), ("accelerometer_position", "a_x", {"ahead": -2.0})],
+)
+def test_curves_cost_and_show_what_the_model_says(effect, where, values):
+    m = model(effect, where, **values)
     given = {"steering": Steering(0.03, 6.0)}
     clean, hidden = drive(Model(), **given), drive(m, **given)
     extended = extended_inputs(hidden, CAR, m)

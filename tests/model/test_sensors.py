@@ -114,6 +114,12 @@ def test_an_antenna_moves_with_the_pitching_body():
     assert x == pytest.approx(0.005, abs=1e-12)
 
 
+def test_an_accelerometer_ahead_of_the_centre_of_gravity_is_turned_with_the_car():
+    own = drive(a_x=lambda t: 0.0 * t, yaw_rate=lambda t: 0.1 * t)
+    t, x = seen(own, one("a_x", Channel(ahead=0.5)))["a_x"]
+    assert x == pytest.approx(-0.5 * (0.1 * t) ** 2, abs=1e-12)  # towards the middle of the curve, behind it
+
+
 def test_lag_of_a_ramp_and_of_a_step():
     tau = 0.02
     t, x = seen(drive(a_x=ramp), one("a_x", Channel(lag_s=tau)))["a_x"]
