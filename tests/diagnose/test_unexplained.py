@@ -243,7 +243,9 @@ def test_what_the_wheels_do_shows_in_their_slip(mechanism, channel):
         residual=f[0] + 0.01 * rng.standard_normal((2, 500)), mask=np.ones(500, dtype=bool),
         channels=("kinematic", "slip_fl"),
     )  # fmt: skip
-    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == mechanism), manner="")
+    shape = SimpleNamespace(
+        mechanism=next(m for m in MECHANISMS if m.name == mechanism), manner="", coordinates=("torque",)
+    )
     block = Block("a", "shape", (0,), np.eye(1), 0.0, 0)
     field = SimpleNamespace(
         parts=(part,), blocks=(block,), shapes=(shape,), drawn=lambda *_: f, mechanism=lambda _: shape.mechanism
@@ -253,9 +255,12 @@ def test_what_the_wheels_do_shows_in_their_slip(mechanism, channel):
     assert (is_large, share > 0.9) == ((True, True) if channel == "kinematic" else (False, False))
 
 
-@pytest.mark.parametrize("manner", ["", "from 10 s to 20 s"])
-def test_an_offset_in_one_kind_of_driving_is_no_smooth_function(manner):
-    """It explains much of a channel, and nothing of how the channel varies where it acts. An interval is an offset."""
+@pytest.mark.parametrize(
+    ("manner", "over", "counts"), [("", "torque", False), ("", "yaw_rate", True), ("from 10 s to 20 s", "torque", True)]
+)
+def test_an_offset_in_one_kind_of_driving_is_no_smooth_function(manner, over, counts):
+    """It explains much of a channel, and nothing of how the channel varies where it acts. An interval is an offset; of
+    turning no simulator has offsets."""
     rng = np.random.default_rng(8)
     acts = np.arange(500) < 100
     f = 0.3 * np.where(acts, 1.0 + 0.1 * rng.standard_normal(500), 0.0)[None, None]
@@ -263,13 +268,15 @@ def test_an_offset_in_one_kind_of_driving_is_no_smooth_function(manner):
         residual=0.3 * acts[None] + 0.02 * rng.standard_normal((1, 500)), mask=np.ones(500, dtype=bool),
         channels=("kinematic",),
     )  # fmt: skip
-    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == "force"), manner=manner)
+    shape = SimpleNamespace(
+        mechanism=next(m for m in MECHANISMS if m.name == "force"), manner=manner, coordinates=(over,)
+    )
     block = Block("a", "shape", (0,), np.eye(1), 0.0, 0)
     field = SimpleNamespace(
         parts=(part,), blocks=(block,), shapes=(shape,), drawn=lambda *_: f, mechanism=lambda _: shape.mechanism
     )
     _, share, _ = unexplained._where(field, [0], [0], Fitted([0], np.ones(1), np.eye(1)))
-    assert share == pytest.approx(0.95 if manner else 0.0, abs=0.04)
+    assert share == pytest.approx(0.95 if counts else 0.0, abs=0.04)
 
 
 AXLES_SLIP = {"f": np.array([1.0, 1.0, 0.0, 0.0]), "r": np.array([0.0, 0.0, 1.0, 1.0])}
@@ -356,7 +363,7 @@ def shown(channels, y, functions, manners):
     part = SimpleNamespace(residual=y, mask=np.ones(y.shape[1], dtype=bool), channels=channels)
     field = SimpleNamespace(
         parts=(part,), blocks=tuple(Block(str(i), "shape", (i,), np.eye(1), 0.0, i) for i in range(n)),
-        shapes=tuple(SimpleNamespace(mechanism=force, manner=m) for m in manners),
+        shapes=tuple(SimpleNamespace(mechanism=force, manner=m, coordinates=("torque",)) for m in manners),
         drawn=lambda _i, b: functions[int(b.key)][None], mechanism=lambda _: force,
     )  # fmt: skip
     return unexplained._where(field, range(n), range(n), Fitted(list(range(n)), np.ones(n), np.eye(n)))
@@ -389,7 +396,7 @@ def test_between_axles_the_noise_of_the_velocity_cancels():
     part = SimpleNamespace(
         residual=residual, mask=np.ones(500, dtype=bool), channels=("slip_fl", "slip_fr", "slip_rl", "slip_rr")
     )
-    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == "slip_r"), manner="")
+    shape = SimpleNamespace(mechanism=next(m for m in MECHANISMS if m.name == "slip_r"), manner="", coordinates=())
     blocks = tuple(Block(n, "shape", (i,), np.eye(1), 0.0, 0) for i, n in enumerate("ab"))
     drawn = {"a": own[None], "b": other[None]}
     field = SimpleNamespace(
