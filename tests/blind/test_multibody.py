@@ -204,7 +204,7 @@ def test_every_kind_changes_its_drive(name):
     late = {k: 4.0 for k in h.values if k in ("start", "up")}
     h = replace(h, values={**h.values, **late})
     off = replace(h, values={**h.values, **dict.fromkeys(KINDS[name].worth[h.where], KINDS[name].neutral)})
-    brakes = {"time since braking", "a_x"} & set(KINDS[name].depends_on)
+    brakes = {"time since braking", "a_x", "torque"} & set(KINDS[name].depends_on)
     seconds, programme = (60.0, "city") if brakes else (12.0, KINDS[name].programmes[0])
     seen = clean_messages(programme, seconds, h), clean_messages(programme, seconds)
     none = clean_messages(programme, seconds, off)
@@ -244,6 +244,11 @@ def test_odd_forces_are_where_they_say():
     at = [force("garnet", a_x=a, rate=100.0, threshold=0.5) for a in (-2.5, -0.5, 1.0)]
     assert at == pytest.approx([200.0, 0.0, 0.0])
     assert [force("pyrite", v=v, is_open=o, force=40.0) for v, o in ((30.0, 1.0), (30.0, 0.0))] == [90.0, 0.0]
+    given = {"power": 1000.0, "period": 40.0, "phase": 0.0}
+    at = [force("albite", t=t, v=v, **given) for t, v in ((10.0, 20.0), (50.0, 2.0), (30.0, 20.0))]
+    assert at == pytest.approx([50.0, 200.0, 0.0], abs=0.2)
+    at = [force("calcite", torque=x, loss=0.1) * car_of()[0].r_e.mean() for x in (-300.0, 300.0)]
+    assert at == pytest.approx([30.0, 0.0])
 
 
 def test_odd_tyres_and_sensors_are_where_they_say():
@@ -256,6 +261,11 @@ def test_odd_tyres_and_sensors_are_where_they_say():
         one, two = (ride(car, steady(20.0), coast=True, lateral=lateral, odd=o) for o in (odd, NO_ODD))
         turns = [one[f"omega_{w}"][-1] / two[f"omega_{w}"][-1] for w in ("fr", "rl")]
         assert turns[0] / turns[1] - 1.0 == pytest.approx(by, abs=1e-3)
+    odd = applied(Setup(car, NO_ODD, Place()), (Hidden("spinel", None, {"torque": 60.0, "width": 0.2}),)).odd
+    one, two = (ride(car, steady(20.0), lateral=2.0, odd=o) for o in (odd, NO_ODD))
+    more = [(x[f"force_{driven[0]}"] - x[f"force_{driven[1]}"])[-300:].mean() * car.r_e[2] for x in (one, two)]
+    faster = (one[f"omega_{driven[1]}"] - one[f"omega_{driven[0]}"])[-300:].mean()
+    assert more[0] - more[1] == pytest.approx(120.0 * np.tanh(faster / 0.2), rel=0.05)
     place = Hidden("galena", None, {"depth": 0.4, "period": 200.0, "phase": 0.0})
     for hidden, by, at, near, expected in (
         (band, "v_x", (13.0, 18.0, 20.0, 28.0), 0.3, [1.0, 1.0 - 0.4 * np.exp(-0.5), 0.6, 1.0]),
@@ -302,6 +312,11 @@ def test_odd_tyres_and_sensors_are_where_they_say():
     assert added == pytest.approx(0.2e-3 * np.maximum(pull, 0.0), rel=0.02, abs=1e-4)
     added = seen(Hidden("topaz", "a_x", {"arm": 2.0}))["a_x"] - true["a_x"]
     assert added == pytest.approx(-2.0 * true["yaw_rate"] ** 2, abs=1e-9)
+    added = seen(Hidden("fluorite", "a_x", {"size": 0.1, "time": 9.0}))["a_x"] - true["a_x"]
+    assert added[[0, 900]] == pytest.approx([0.1, 0.1 / np.e], rel=1e-3)
+    ratio = seen(Hidden("epidote", "rl", {"share": 0.5, "speed": 18.0, "width": 0.5}))["omega_rl"] / true["omega_rl"]
+    there = np.abs(true["v_x"] - 18.0) > 1.5
+    assert ratio[there] == pytest.approx(np.where(true["v_x"] < 18.0, 1.0 - 0.5 / TEETH, 1.0)[there], abs=1e-4)
     tilt = Hidden("zircon", None, {"angle": 0.01, "time": 9.0})
     late, none = (clean_messages("city", 60.0, *h)[0].columns["a_x"] for h in ((tilt,), ()))
     after = (late - none)[np.argmax(late - none) :]
@@ -328,6 +343,11 @@ def test_points_are_a_form_as_a_diagnosis_has_it():
     assert np.interp([0.0, 999.0], x, f) == pytest.approx([-0.2, 0.0], abs=0.01)
     _, found, x, f = points("garnet", rate=50.0, threshold=0.8)
     assert f == pytest.approx(50.0 * np.maximum(-0.8 - x, 0.0), abs=0.01)
+    car, _, x, f = points("calcite", loss=0.1)
+    assert f == pytest.approx(np.clip(-0.1 * x / car.r_e.mean(), 0.0, max(f.max(), 5.0)), abs=0.01)
+    assert f.max() > 5.0
+    _, found, x, f = points("fluorite", "a_x", size=0.1, time=20.0)
+    assert (found["unit"], f) == ("m/s^2", pytest.approx(0.1 * np.exp(-x / 20.0), abs=1e-5))
     car, found, x, f = points("torque_read_in_speed", rate=0.03)
     slip = 200.0 / (car.r_e[2] * car.slope[2] * car.static[2])  # of a rear wheel with 200 N m
     there = np.interp(400.0 / car.split_rear, x, found["slip_r"])

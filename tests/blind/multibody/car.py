@@ -121,6 +121,9 @@ class Odd(NamedTuple):
     pyrite: np.ndarray = np.array([0.0, 20.0, 5.0])  # N at 20 m/s, m/s, m/s
     rutile: np.ndarray = np.array([0.0])  # share of the slope
     talc: np.ndarray = np.array([0.0])  # 1/(kN m (10 m/s))
+    albite: np.ndarray = np.array([0.0, 30.0, 0.0])  # W, s, rad
+    calcite: np.ndarray = np.array([0.0])  # 1/m
+    spinel: np.ndarray = np.array([0.0, 0.3])  # N m, rad/s
 
 
 NO_ODD = Odd()

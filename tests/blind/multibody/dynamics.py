@@ -72,6 +72,10 @@ def odd_force(t, share, v, way, steer, torque, a_side, yaw, a_x, is_open, odd):
     if odd.garnet[0] != 0.0:
         F += odd.garnet[0] * max(-a_x - odd.garnet[1], 0.0)
     F += odd.pyrite[0] * (v / 20.0) ** 2 * is_open
+    F += odd.calcite[0] * max(-torque, 0.0)
+    if odd.albite[0] != 0.0:  # a power, on and off
+        on = tanh(8.0 * sin(2.0 * pi * t / odd.albite[1] + odd.albite[2]))
+        F += odd.albite[0] / max(v, 5.0) * 0.5 * (1.0 + on)
     return F * tanh(v / 0.5)
 
 
@@ -203,6 +207,8 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
         ripple = 0.0
         if odd.ripple[0] != 0.0 and i == int(odd.ripple[1]):
             ripple = odd.ripple[0] * sin(odd.ripple[2] * y[ANGLE + i])
+        if (p.split_rear if i > 1 else 1.0 - p.split_rear) > 0.0:  # from the faster wheel of an axle to the other
+            ripple -= odd.spinel[0] * tanh((y[RIM + i] - y[RIM + (i ^ 1)]) / odd.spinel[1])
         f[RIM + i] = (aux[T_SHAFT + i] - T - drag * tanh(y[RIM + i]) + ripple) / p.rim[i]
         f[BELT + i] = (T - F_x * r_e - against) / p.belt[i]
         f[TORSION + i] = slipping

@@ -84,7 +84,7 @@ def _read(s: Setup, total: np.ndarray) -> np.ndarray:
 
 FUNCTIONS: Mapping[str, Function] = {
     "speed_hump": _force("v"), "steering_drag": _force("steer"), "basalt": _force("a_side"), "agate": _force("yaw"),
-    "garnet": _force("a_x"),
+    "garnet": _force("a_x"), "calcite": lambda s, x, i: _force("torque")(s, _torques(s, x)[0].sum(axis=0), i),
     "odd_hours": lambda s, x, i: _force("share")(s, x / x[-1], i),
     "lingering_brake": lambda s, x, _: 2.0 * s.odd.linger[0] / s.car.r_e[2] * np.exp(-x / s.odd.linger[1]),
     "gneiss": _slope("v"), "yawing_slip": _slope("yaw"),
@@ -98,6 +98,7 @@ FUNCTIONS: Mapping[str, Function] = {
     "dolomite": lambda s, x, _: misread(0.0, s.errors["a_y"], x),
     "olivine": lambda s, x, _: misread(0.0, s.errors["a_y"], 15.0, x),
     "topaz": lambda s, x, _: misread(0.0, s.errors["a_x"], 15.0, 0.0, x),
+    "fluorite": lambda s, x, _: s.errors["a_x"].fresh[0] * np.exp(-x / s.errors["a_x"].fresh[1]),
     # less what the sensor takes for its own pitch
     "zircon": lambda s, x, _: G * s.odd.zircon[0] * np.exp(-x / s.odd.linger[1]) / (1.0 + G * gradients(s.car)[0]),
 }  # fmt: skip

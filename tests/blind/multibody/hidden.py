@@ -1,7 +1,8 @@
 """What may be hidden in a drive: the contract's effects by their names and parameters, and forms that no effect has.
 
 Sizes: `worth` of each parameter is a size worth naming, `draw` takes two to four of them, either sign where both exist.
-`cases` then enlarges what a drive would not show with a detectability of `cases.Z_LEAST`.
+`cases` then enlarges what a drive would not show with a detectability of `cases.Z_LEAST`; for what is held back `make`
+draws another drive and size instead.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from .car import Car, Odd, settle
 from .roads import Place
-from .sensors import WHEELS, Error
+from .sensors import TEETH, WHEELS, Error
 
 __all__ = [
     "HELD_BACK", "KINDS", "TWINS", "Hidden", "Kind", "Setup", "applied", "draw", "enlarged", "in_worths", "names_of",
@@ -379,20 +380,36 @@ _UNKNOWN = {
         programmes=("city", "country", "staircase")),
     "garnet": _form(
         _by("rate", all_=38.5), _odd("garnet", "rate", "threshold"), "force_balance", ("a_x",), programmes=LIVELY, signs=1,
-        held_back=True, shape=lambda rng: {"threshold": rng.uniform(0.4, 0.9)}),
+        shape=lambda rng: {"threshold": rng.uniform(0.4, 0.9)}),
     "pyrite": _form(
         _by("force", all_=24.0), _odd("pyrite", "force", "up", "gap"), "force_balance", ("v_x",),
-        programmes=("country", "staircase"), held_back=True,
+        programmes=("country", "staircase"),
         shape=lambda rng: {"up": rng.uniform(18.0, 23.0), "gap": rng.uniform(3.5, 6.0)}),
     "rutile": _form(
-        _by("depth", all_=0.14), _odd("rutile", "depth"), "slip", ("torque",), programmes=("country", "staircase"),
-        held_back=True),
+        _by("depth", all_=0.14), _odd("rutile", "depth"), "slip", ("torque",), programmes=("country", "staircase")),
     "talc": _form(
-        _by("rate", all_=0.08), _odd("talc", "rate"), "slip", ("v_x", "torque"), programmes=("country", "staircase"), signs=1,
-        held_back=True),
+        _by("rate", all_=0.08), _odd("talc", "rate"), "slip", ("v_x", "torque"), programmes=("country", "staircase"), signs=1),
     "topaz": _form(
         _by("arm", a_x=0.5), _signal("a_x", lambda e, v: e._replace(arm=v["arm"])), "accelerometer", ("yaw_rate",),
-        programmes=("city",), held_back=True),
+        programmes=("city",)),
+    "albite": _form(
+        _by("power", all_=500.0), _odd("albite", "power", "period", "phase"), "force_balance", ("time", "v_x"),
+        programmes=("country", "staircase"), signs=1, held_back=True,
+        shape=lambda rng: {"period": rng.uniform(25.0, 50.0), "phase": rng.uniform(0.0, 6.28)}),
+    "calcite": _form(
+        _by("loss", all_=0.025), lambda s, v, _: replace(
+            s, odd=s.odd._replace(calcite=np.array([v["loss"] / s.car.r_e.mean()]))), "force_balance", ("torque",),
+        programmes=("city", "country", "staircase"), signs=1, held_back=True),
+    "epidote": _form(
+        {w: {"share": 0.1} for w in WHEELS}, _signal("fl", lambda e, v: e._replace(
+            missed=(v["share"] / TEETH, v["speed"], v["width"]))), "slip", ("v_x",), programmes=("city",), signs=1,
+        held_back=True, shape=lambda rng: {"speed": rng.uniform(4.0, 8.0), "width": rng.uniform(0.4, 1.0)}),
+    "spinel": _form(
+        _by("torque", all_=15.0), _odd("spinel", "torque", "width"), "slip", ("yaw_rate",), programmes=("city", "country"),
+        signs=1, held_back=True, shape=lambda rng: {"width": rng.uniform(0.15, 0.4)}),
+    "fluorite": _form(
+        _by("size", a_x=0.04), _signal("a_x", lambda e, v: e._replace(fresh=(v["size"], v["time"]))), "accelerometer",
+        ("time",), held_back=True, shape=lambda rng: {"time": rng.uniform(15.0, 45.0)}),
 }  # fmt: skip
 
 KINDS: Mapping[str, Kind] = {**_KNOWN, **_UNKNOWN}

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,14 @@ from aqualog.core.vehicle import vehicle_toml
 from aqualog.io.write_log import LogGroup, write_log
 
 from .cases import KIND_NAMES, Z_LEAST, draw_plan, make_case
+from .hidden import HELD_BACK
 from .seal import seal_truth
 from .sensors import UNITS, Message
 
 __all__ = ["main", "write_messages"]
 
 START_NS = 1_700_000_000_000_000_000  # of every log, so that it says nothing
+AGAIN = 10_000  # added to a case's number when all but its form is drawn again
 
 
 def write_messages(path: Path, messages: Sequence[Message]) -> None:
@@ -58,9 +61,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if given.held_back and given.seed < 1000:
         parser.error("--held-back is for seeds from 1000 on: never for development")
     for number in range(given.first, given.first + given.count):
-        plan = draw_plan(given.seed, number, given.kind, wet=given.wet, held_back=given.held_back, scale=given.scale,
-                         duration_s=given.duration)  # fmt: skip
-        case = make_case(plan, z_least=Z_LEAST if given.scale >= 1.0 else 0.0)
+        plans = (draw_plan(given.seed, n, given.kind, wet=given.wet, held_back=given.held_back, scale=given.scale,
+                           duration_s=given.duration) for n in count(number, AGAIN))  # fmt: skip
+        plan = next(plans)
+        names = [h.name for h in plan.hidden]
+        as_drawn = bool(set(names) & set(HELD_BACK))
+        case = make_case(plan, z_least=0.0 if as_drawn or given.scale < 1.0 else Z_LEAST)
+        while as_drawn and given.scale >= 1.0 and min(h["z_own"] for h in case.truth["hidden"]) < Z_LEAST:
+            case = make_case(next(p for p in plans if [h.name for h in p.hidden] == names), z_least=0.0)
         folder = given.folder / f"case_{number:04d}"
         folder.mkdir(parents=True)
         write_messages(folder / f"drive{given.suffix}", case.drive)

@@ -58,7 +58,8 @@ class Error(NamedTuple):
     `shake`: added at a speed [m/s], half of it so much beside that [m/s]. `tip`: added with the sign of the lateral
     acceleration that was last beyond so much [m/s^2]. `dead`: of the signal, below which it is hardly read.
     `pulse`: relative, up and down over a period [s] from a phase on [rad]. `lean`: added per kN m of all pull.
-    `arm`: taken off per square of the yaw rate [m].
+    `arm`: taken off per square of the yaw rate [m]. `fresh`: added at the start, and the time in which it goes [s].
+    `missed`: share of a wheel's teeth that is not seen below a speed and its width [m/s].
     """
 
     gain: float = 1.0
@@ -76,6 +77,8 @@ class Error(NamedTuple):
     pulse: tuple[float, float, float] = (0.0, 30.0, 0.0)
     lean: float = 0.0
     arm: float = 0.0
+    fresh: tuple[float, float] = (0.0, 30.0)
+    missed: tuple[float, float, float] = (0.0, 6.0, 0.7)
 
 
 class Message(NamedTuple):
@@ -148,7 +151,7 @@ def _messages(rows, car, errors, noise, rng):
             x = x * (1.0 + e.pulse[0] * np.tanh(3.0 * np.sin(2.0 * np.pi * middle / e.pulse[1] + e.pulse[2])))
             when = t / (1.0 + e.skew * 1e-6) - e.delay + offset
             x = CubicSpline(middle, x)(np.clip(when, middle[0], middle[-1]))
-            x = e.gain * x + e.bias + e.drift * t
+            x = e.gain * x + e.bias + e.drift * t + e.fresh[0] * np.exp(-t / e.fresh[1])
             if noise is not None:
                 share = SHARE[stem]
                 white = rng.standard_normal(t.size)
@@ -200,7 +203,8 @@ def _truth(rows, car, errors, phases, noise, rng):
             omega = edges(angle, 2e-3 * rng.standard_normal(TEETH))
         else:
             omega = omega * (1.0 + e.ring * np.sin(angle + phases[i]))
-        x[f"omega_{w}"] = omega * (1.0 + e.by_torque * (torque / 1e3) ** 2)
+        unseen = e.missed[0] * 0.5 * (1.0 - np.tanh((rows[:, ROWS["v_x"]] - e.missed[1]) / e.missed[2]))
+        x[f"omega_{w}"] = omega * (1.0 + e.by_torque * (torque / 1e3) ** 2) * (1.0 - unseen)
         keep = np.exp(-DT / 0.012)
         lagged = lfilter([1.0 - keep], [1.0, -keep], torque)
         # the estimate comes late by its filter, and the logger knows by how much
