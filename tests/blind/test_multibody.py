@@ -310,7 +310,7 @@ def test_odd_tyres_and_sensors_are_where_they_say():
     added = seen(Hidden("olivine", "a_y", {"lean": 0.2}))["a_y"] - true["a_y"]
     pull = sum(x for s, x in true.items() if s.startswith("torque"))
     assert added == pytest.approx(0.2e-3 * np.maximum(pull, 0.0), rel=0.02, abs=1e-4)
-    added = seen(Hidden("topaz", "a_x", {"arm": 2.0}))["a_x"] - true["a_x"]
+    added = seen(Hidden("accelerometer_position", "a_x", {"ahead": 2.0}))["a_x"] - true["a_x"]
     assert added == pytest.approx(-2.0 * true["yaw_rate"] ** 2, abs=1e-9)
     added = seen(Hidden("fluorite", "a_x", {"size": 0.1, "time": 9.0}))["a_x"] - true["a_x"]
     assert added[[0, 900]] == pytest.approx([0.1, 0.1 / np.e], rel=1e-3)

@@ -97,7 +97,6 @@ FUNCTIONS: Mapping[str, Function] = {
     "feldspar": lambda s, x, _: misread(x, s.errors["a_x"], 15.0) - x,
     "dolomite": lambda s, x, _: misread(0.0, s.errors["a_y"], x),
     "olivine": lambda s, x, _: misread(0.0, s.errors["a_y"], 15.0, x),
-    "topaz": lambda s, x, _: misread(0.0, s.errors["a_x"], 15.0, 0.0, x),
     "fluorite": lambda s, x, _: s.errors["a_x"].fresh[0] * np.exp(-x / s.errors["a_x"].fresh[1]),
     # less what the sensor takes for its own pitch
     "zircon": lambda s, x, _: G * s.odd.zircon[0] * np.exp(-x / s.odd.linger[1]) / (1.0 + G * gradients(s.car)[0]),

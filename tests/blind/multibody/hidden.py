@@ -250,6 +250,8 @@ _KNOWN = {
     "accelerometer_gain": Kind(_by("gain", a_x=0.02), _signal("a_x", lambda e, v: e._replace(gain=e.gain * v["gain"])),
                                LIVELY, neutral=1.0),
     "accelerometer_drift": Kind(_by("drift", a_x=3e-4), _signal("a_x", lambda e, v: e._replace(drift=v["drift"]))),
+    "accelerometer_position": Kind(
+        _by("ahead", a_x=0.5), _signal("a_x", lambda e, v: e._replace(arm=v["ahead"])), ("city",)),
     "signal_delay": Kind(_by("delay", a_x=0.025, v_x=0.05, torque=0.03, omega=0.025), _signal(
         "v_x", lambda e, v: e._replace(delay=e.delay + v["delay"])), LIVELY, signs=1),
     "tone_ring": Kind(_by("amplitude", each=0.0012), _signal("fl", lambda e, v: e._replace(ring=v["amplitude"])), signs=1),
@@ -389,9 +391,6 @@ _UNKNOWN = {
         _by("depth", all_=0.14), _odd("rutile", "depth"), "slip", ("torque",), programmes=("country", "staircase")),
     "talc": _form(
         _by("rate", all_=0.08), _odd("talc", "rate"), "slip", ("v_x", "torque"), programmes=("country", "staircase"), signs=1),
-    "topaz": _form(
-        _by("arm", a_x=0.5), _signal("a_x", lambda e, v: e._replace(arm=v["arm"])), "accelerometer", ("yaw_rate",),
-        programmes=("city",)),
     "albite": _form(
         _by("power", all_=500.0), _odd("albite", "power", "period", "phase"), "force_balance", ("time", "v_x"),
         programmes=("country", "staircase"), signs=1, held_back=True,
