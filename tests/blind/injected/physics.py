@@ -13,6 +13,7 @@ motion needs. So each effect touches:
 | torque_gain | torque | reported torque over the gain; the motion, so the true torque, stays |
 | signal_delay | the signal, or all of `omega`, `torque` | cubic between samples, held at the ends |
 | accelerometer_bias, _gain, _drift | accelerometer | |
+| accelerometer_position | accelerometer | less the distance times the square of the yaw rate over 0.4 s |
 | velocity_scale | v_x | |
 | tyre_radius | speed of that wheel, torque of its axle | speed / (1 + delta); the same force needs the torque of a larger wheel |
 | slip_stiffness | wheel speeds | slip of rolling contact over the gain; static loads with the shift by acceleration |
@@ -92,7 +93,11 @@ def shifted(x: FloatArray, by: float) -> FloatArray:
 
 def _felt(drive: Drive) -> FloatArray:
     """Specific force along the car without the accelerometer's fastest noise [m/s²]."""
-    a = filled(drive.columns["a_x"])
+    return _quiet(drive, "a_x")
+
+
+def _quiet(drive: Drive, signal: str) -> FloatArray:
+    a = filled(drive.columns[signal])
     n = max(round(SMOOTH_S / drive.dt), 1)
     window = np.hanning(n + 2)[1:-1]
     padded = np.pad(a, (n // 2, n - 1 - n // 2), mode="edge")
@@ -220,7 +225,8 @@ def _delay(d: Drive, v: Values, where: str | None) -> Columns:
 
 def _accelerometer(d: Drive, v: Values, where: str | None) -> Columns:
     x = d.columns[where or "a_x"]
-    return {where or "a_x": v.get("gain", 1.0) * x + v.get("bias", 0.0) + v.get("drift", 0.0) * d.columns["t"]}
+    turned = v["ahead"] * _quiet(d, "yaw_rate") ** 2 if "ahead" in v else 0.0
+    return {where or "a_x": v.get("gain", 1.0) * x + v.get("bias", 0.0) + v.get("drift", 0.0) * d.columns["t"] - turned}
 
 
 def _radius(d: Drive, v: Values, where: str | None) -> Columns:
@@ -272,7 +278,7 @@ def _wave(d: Drive, v: Values, _: str | None) -> Columns:
 EFFECTS: dict[str, Callable[[Drive, Values, str | None], Columns]] = {
     "payload_mass": _payload, "aero_drag": _drag, "head_wind": _wind, "rolling_resistance": _rolling, "brake_drag": _brake,
     "road_grade": _grade, "torque_gain": _gain_of_torque, "signal_delay": _delay, "accelerometer_bias": _accelerometer,
-    "accelerometer_gain": _accelerometer, "accelerometer_drift": _accelerometer,
+    "accelerometer_gain": _accelerometer, "accelerometer_drift": _accelerometer, "accelerometer_position": _accelerometer,
     "velocity_scale": lambda d, v, _: {"v_x": v["scale"] * d.columns["v_x"]}, "tyre_radius": _radius,
     "slip_stiffness": _stiffness, "tone_ring": _ring,
     "force_hump": _hump, "force_step": _step, "accelerometer_speed": _over_speed, "force_wave": _wave,

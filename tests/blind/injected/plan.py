@@ -54,6 +54,7 @@ ASKS: tuple[Ask, ...] = (
     Ask("accelerometer_bias", "a_x", "bias", ("a_x",), 1.0),
     Ask("accelerometer_gain", "a_x", "gain", ("a_x",), 0.3, 1.0),
     Ask("accelerometer_drift", "a_x", "drift", ("a_x",), 0.01),
+    Ask("accelerometer_position", "a_x", "ahead", ("a_x", "yaw_rate"), 4.0),
     Ask("velocity_scale", "v_x", "scale", ("v_x", *_ANY_WHEEL), 0.1, 1.0),
     Ask("tyre_radius", "fl", "delta", _ANY_WHEEL, 0.05),
     Ask("tyre_radius", "rr", "delta", _ANY_WHEEL, 0.05),

@@ -118,6 +118,9 @@ def test_sensors(drive):
     assert np.abs(half - np.interp(c["t"] - 0.01, c["t"], c["a_x"]))[3:-3].max() < 1e-4
     assert change(drive, "accelerometer_drift", "a_x", drift=1e-3)["a_x"][-1] == pytest.approx(1e-3 * c["t"][-1])
     assert change(drive, "accelerometer_gain", "a_x", gain=1.1)["a_x"] == pytest.approx(0.1 * c["a_x"])
+    turning = Drive("test", "made", {**c, "yaw_rate": 0.02 * c["v_x"]}, CAR, HERE / "rav4.toml")
+    moved = change(turning, "accelerometer_position", "a_x", ahead=-2.0)["a_x"]
+    assert moved[MIDDLE] == pytest.approx(2.0 * (0.02 * c["v_x"][MIDDLE]) ** 2, abs=0.01)
     assert set(change(drive, "velocity_scale", "v_x", scale=1.02)) == {"v_x"}
     smaller = inject(drive, "tyre_radius", "rr", {"delta": -0.01}).columns
     assert smaller["omega_rr"] == pytest.approx(c["omega_rr"] / 0.99)
