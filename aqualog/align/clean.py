@@ -276,7 +276,7 @@ class Cleaner:
             notes.append(
                 f"{self.where}: {self._out} of {self._in_order} samples outside {self._symbol.low:g} ... "
                 f"{self._symbol.high:g} {self._symbol.unit} (first: {value:.6g} at {float(at - begin) * 1e-9:.2f} s) "
-                "are left out"
+                f"are left out{': all of them, its unit or its sign is wrong' if self._out == self._in_order else ''}"
             )
         if self._unmeasured.frozen:
             notes.append(freeze_note(self.where, self._frozen, begin, self._unmeasured.frozen))

@@ -160,6 +160,7 @@ def bin_mean(
 
 MAX_ROWS = 60_000_000
 _SPARSE_ROWS = 1_000_000  # beyond, a grid with one sample in 50 points is a jump of the time stamps, not a drive
+_LEAST_PERIOD_NS = 50_000  # 20 kHz: no signal of a car is sampled faster; seconds read as milliseconds are
 _PHASES = 1000  # points of a drive at which a grid is compared with stamps
 _NICE_HZ = (1, 2, 4, 5, 8, 10, 20, 25, 40, 50, 80, 100, 125, 200, 250, 400, 500, 1000)
 
@@ -249,8 +250,17 @@ def _grid_step(cleaned: Sequence[Clean], rate_hz: float | None) -> int:
         periods = [c.span.mean_period_ns for c in cleaned if c.symbol.kind == "continuous"]
     periods = [p for p in periods if p > 0]
     if not periods:
-        raise SignalError("no signal has two samples", expected="a drive", hint="check the log")
+        raise SignalError(
+            "no signal has two samples at different times", where=cleaned[0].origin.file if cleaned else "",
+            expected="a drive", hint="check the column of the time, and its unit",
+        )  # fmt: skip
     period = min(periods)
+    if period < _LEAST_PERIOD_NS:
+        raise SignalError(
+            f"the time stamps are {period * 1e-9:.1e} s apart", where=cleaned[0].origin.file,
+            expected=f"{_LEAST_PERIOD_NS * 1e-9:g} s or more",
+            hint="check the unit of the time; --rate takes another rate",
+        )  # fmt: skip
     # jitter and rounding of stamps must not make the grid run at 100.02 Hz: nearest whole rate within 2 %
     for rate in _NICE_HZ:
         if abs(period * rate / 1e9 - 1.0) < 0.02:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from aqualog.checks.doubts import Doubt
-from aqualog.checks.driven import LEAST_DRIVE, LEAST_SAMPLES, STILL, drives, shown
+from aqualog.checks.driven import LEAST_DRIVE, STILL, drives, shown
 from aqualog.checks.slip import AXLE, slip_doubts
 from aqualog.checks.windows import EXTRA, Windows
 from aqualog.core.intervals import half_width
@@ -18,6 +18,7 @@ from aqualog.core.vehicle import KEYS, Vehicle
 
 __all__ = ["drive_doubts"]
 
+LEAST_SAMPLES = 50  # of the measure
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
 GAIN_OFF = 0.10  # of the torque gain, or of the mass: more than fuel, load and a driveline's losses
 MOVING = 5.0  # [m/s]

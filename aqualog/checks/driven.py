@@ -11,9 +11,9 @@ from aqualog.core.notation import AXLES
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["LEAST_DRIVE", "LEAST_SAMPLES", "STILL", "drives", "no_drivetrain", "shown"]
+__all__ = ["LEAST_DRIVE", "STILL", "drives", "no_drivetrain", "shown"]
 
-LEAST_SAMPLES = 50
+LEAST_SAMPLES = 20
 LEAST_DRIVE = 50.0  # [N m] of an axle, nine tenths of the drive below it: less shows no drivetrain
 STILL = 0.02  # of the other axle's drive: less is no drive
 

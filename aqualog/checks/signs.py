@@ -16,7 +16,7 @@ from aqualog.checks.course import turning_by_course
 from aqualog.checks.doubts import Change, Doubt, exchanged
 from aqualog.checks.follows import follow
 from aqualog.checks.relations import Relation, changes, relate
-from aqualog.checks.windows import Windows
+from aqualog.checks.windows import Windows, middle
 from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import FloatArray
 
@@ -28,6 +28,7 @@ LONGITUDINAL = 0.10  # [m/s^2] changes of less are no driving
 MOTION = 0.3  # [m/s^2] standard deviation of the change of dv/dt: less may be the resolution of the speed
 UNRELATED = 0.4  # correlation below which an accelerometer shows another axis: noise and a second of delay leave more
 LATERAL = 0.06  # [m/s^2] changes of less are no steering, but wind and the crown of the road
+LEAST_AGAINST, MOSTLY = 10, 0.5  # windows, and share of those that move, in which a car surely does not go backwards
 MOVING = 3.0  # [m/s] below, wheels stand or go backwards without a sign
 BANKED, LITTLE = 1.0, 0.3  # [m/s^2] a bend on which banks may count, and what is no bend the other way
 OVAL_SHARE = 0.05  # of the drive
@@ -59,8 +60,25 @@ def sign_doubts(windows: Windows) -> Iterator[Doubt]:
     speed = windows.speed
     if not speed.size:
         return
+    yield from _velocity(windows)
     yield from _forward(windows, speed)
     yield from _turning(windows, speed)
+
+
+def _velocity(windows: Windows) -> Iterator[Doubt]:
+    """Yield a velocity against the wheels for most of a drive; the negative one is turned: cars drive forward."""
+    if "v_x" not in windows or not windows.wheels:
+        return
+    v, wheels = windows["v_x"], middle(list(windows.wheels.values()))
+    with np.errstate(invalid="ignore"):
+        moves = (np.abs(v) > MOVING) & (np.abs(wheels) > MOVING)
+        against = moves & (v * wheels < 0.0)
+    share = float(against.sum()) / max(int(moves.sum()), 1)
+    if int(against.sum()) < LEAST_AGAINST or share < MOSTLY:
+        return
+    own = ("v_x",) if float(np.median(v[against])) < 0.0 else tuple(f"omega_{w}" for w in windows.wheels)
+    what = f"v_x has the opposite sign of the wheels in {share:.0%} of the time in which both move"
+    yield Doubt("sign", own, what, "forward is positive", ways=(dict.fromkeys(own, TURN),), value=share)
 
 
 def _forward(windows: Windows, speed: FloatArray) -> Iterator[Doubt]:

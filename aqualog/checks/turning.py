@@ -73,6 +73,10 @@ def _factors(symbol: str, seen: Mapping[str, FloatArray], step_s: float) -> dict
         both = np.isfinite(own) & np.isfinite(seen[name])
         ratio, r = _rms(seen[name][both]) / _rms(own[both]), abs(relation.r)
         found[name] = ratio if r * ratio > RATIO or ratio / r < 1.0 / RATIO else 1.0
+    # a bend shows at both axles; what one alone shows is slip, as on water
+    axles = {"front", "rear"} & seen.keys()
+    if len(axles) == 2 and len(axles & found.keys()) == 1:
+        return {n: x for n, x in found.items() if n not in axles}
     return found
 
 

@@ -193,7 +193,8 @@ def _simulated(
     if moved != model:
         new = tuple(t for t in moved.terms if t not in model.terms)
         notes = tuple(
-            f"An uncertain value of the vehicle file is likeliest on these drives with {term_words(t)}." for t in new
+            f"The vehicle file is not sure of every value. The verdict holds with what fits best: {term_words(t)}."
+            for t in new
         )
         model, bare = moved, Model((*bare.terms, *new))
         ready = [led_by(d, model) for d in ready]

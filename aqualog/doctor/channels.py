@@ -64,7 +64,7 @@ def _of_values(own: ChannelOverview, channel: Channel, standing: Sequence[Stretc
     if own.samples == 0:
         yield Finding("doubt", "empty", own.file, own.path, "has no sample")
         return
-    if own.not_finite:
+    if own.not_finite and not own.name.rpartition(".")[2].startswith("true_"):  # what the simulation knows besides
         what = f"{own.not_finite} of {own.samples} samples are no numbers (NaN, infinite, marked invalid); not used"
         yield Finding("doubt", "not_finite", own.file, own.path, what, "", own.not_finite, own.samples)
     if own.remark and own.remark not in ("constant", "no value"):

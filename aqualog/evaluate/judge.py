@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.core.records import DriveResult, Event, FloatArray
+from aqualog.core.records import DriveResult, Event, FloatArray, Remark
 from aqualog.detect.registry import DETECTORS
 from aqualog.detect.stream import RivalResult, Settings, detect_drive, run_rivals
 from aqualog.detect.thresholds import DEFAULT, Thresholds
@@ -36,6 +36,7 @@ class Found:
     unavailable: tuple[str, ...]
     v_x: FloatArray
     notes: tuple[str, ...] = ()
+    checks: tuple[Remark, ...] = ()
 
 
 def judge(drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None) -> RunRecord:
@@ -58,9 +59,11 @@ def run_detectors(
     v_x = drive.signals.array("v_x")
     results: list[DriveResult | RivalResult] = []
     ran: list[str] = []
+    checks: tuple[Remark, ...] = ()
     if own:
         result = detect_drive(drive.signals, drive.vehicle, settings=Settings(thresholds, joint_cusum=drive.joint))
         results.append(result)
+        checks = result.checks
         ran += [d for d in DETECTORS if d not in {u.detector for u in result.unavailable}]
         if "v_x_hat" in result.features.columns:
             v_x = result.features["v_x_hat"].to_numpy()
@@ -81,7 +84,9 @@ def run_detectors(
             *(f"{u.detector} lacks {', '.join(u.missing)}" for u in missing),
             *(f"rival {n}: {why}" for n, why in absent.items()),
             *(h.note for h in heard.values() if h.note),
+            *(r.sentence for r in checks),
         ),
+        checks,
     )  # fmt: skip
 
 
@@ -110,6 +115,7 @@ def record_of(drive: Drive, found: Found, only: Collection[str] | None = None) -
         notes=(*found.notes, *(odd if unknown else ())),
         is_lossy=quality.truncated or quality.lost_in_files > 0,
         heard={n: (h.low, h.high) for n, h in drive.heard.items() if not h.missing},
+        checks=found.checks,
     )
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from aqualog.core.records import Remark
+
 __all__ = ["Cell", "DetectorRun", "Hit", "RunRecord"]
 
 
@@ -63,7 +65,8 @@ class RunRecord:
 
     `dry_s` [s] and `dry_m` [m] are time and way outside water (and the second after it); `wet_s` is the time on water
     without aquaplaning. `detectors` holds those that could run, `unavailable` the others; `is_lossy` if the
-    log was cut or damaged. `heard`: least and greatest value of the channel of each rival in the log.
+    log was cut or damaged. `heard`: least and greatest value of the channel of each rival in the log. `checks`: inputs
+    that do not fit each other.
     """
 
     name: str
@@ -77,3 +80,4 @@ class RunRecord:
     notes: tuple[str, ...] = ()
     is_lossy: bool = False
     heard: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    checks: tuple[Remark, ...] = ()

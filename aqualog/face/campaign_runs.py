@@ -229,10 +229,15 @@ class CampaignRuns(Result):
         return {"runs": self.runs, "events": self.events, "episodes": self.episodes}
 
     def text(self) -> str:
+        from aqualog.report.inputs import of_runs
         from aqualog.report.text import table
         from aqualog.report.values import counted
 
-        rows = [(d, str(n), f"{k} of {len(self.data.done)}") for d, (n, k) in self._counts().items()]
+        able = {d: sum(d not in r.about["unavailable"] for r in self.data.done) for d in self._counts()}
+        rows = [
+            (d, str(n), f"{k} of {able[d]}") if able[d] else (d, "-", "no run can be judged")
+            for d, (n, k) in self._counts().items()
+        ]
         found = self._verdicts()
         wet = sum(len(r.judgement.of("aquaplaning")) for r in self.data.done)
         told = [
@@ -241,6 +246,7 @@ class CampaignRuns(Result):
             (found["cannot_be_judged"], f"{counted(found['cannot_be_judged'], 'run')} cannot be judged"),
         ]
         head = "; ".join(x for n, x in told if n)
+        head += f"\n{doubt}" if (doubt := of_runs({r.name: r.checks for r in self.data.done})) else ""
         return f"{self._head()}\n{head}\n\n{table(('detector', 'events', 'runs with one'), rows)}\n"
 
     def headline(self) -> str:

@@ -444,6 +444,9 @@ def check_something_to_do(
     rates = {"wheel speeds": "omega_fl", "signals at": "a_x"}
     asked = ("omega_", "torque", "a_x", *(rate for rate, signal in rates.items() if signal not in lacks))
     missing = [s for s in lacks if s.startswith(asked)]
+    if all(" Hz or more" in s for s in missing):
+        hint = "a faster log; the unit of its time, and what was logged more slowly than the rest"
+        notes = (f"the log has {rate_hz:.3g} Hz", *notes)
     raise SignalError(
         f"no detector can run: missing {', '.join(missing)}" + (f" ({notes[0]})" if notes else ""),
         where=name,

@@ -186,7 +186,9 @@ class Result(ABC):
 
 
 def check_csv(path: Path) -> Path:
-    """Return the name of a table to be written; a ConfigError if it is no .csv."""
+    """Return the name of a table to be written, with `.csv` where it has no ending; a ConfigError if it is no .csv."""
+    if not path.suffix:
+        path = path.with_name(f"{path.name}.csv")
     if path.suffix.lower() != ".csv":
         raise ConfigError(f'"{path.suffix}" is no CSV', where=str(path), expected="a name that ends in .csv")
     return path

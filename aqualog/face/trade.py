@@ -160,6 +160,8 @@ def tyre_test(
     campaign = own.configured.campaign
     keys = check_plan(campaign, split(by)).keys
     check_control(campaign, text_of(control, "control"))
+    if index != 100.0 and not control:
+        raise ConfigError("an index without a control", expected="the control's tyre, whose index this is")
     used = defaults() if limits is None else load_limits(file_of(limits, "limits"))
     coefficients = given.pop("coefficients", None)
     options = Options(

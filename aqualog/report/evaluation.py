@@ -15,6 +15,7 @@ from aqualog.evaluate.run import Evaluation, Tuning
 from aqualog.evaluate.sweep import RocPoint
 from aqualog.report import evaluation_words as words
 from aqualog.report.evaluation_figures import evaluation_figures
+from aqualog.report.inputs import of_runs
 from aqualog.report.sections import Cell, Figures, Headline, Lines, Para, Report, Section, Table
 from aqualog.report.values import counted, fields_of, number, plain
 
@@ -70,6 +71,8 @@ def evaluation_report(evaluation: Evaluation, *, by: Sequence[str] = (), gates: 
             Lines(answers or [words.headline(evaluation)]),
         ], where="text"),
         Section("", [Headline(words.headline(evaluation), answers)], "verdict", look="verdict open", where="page"),
+        Section("Inputs", [Lines([x for x in [of_runs({r.name: r.checks for r in records})] if x])], "inputs",
+                look="problems"),
         Section("Gates", [Table(("Gate", "Found", "Kept"), [
             (g.gate.text, g.found, "yes" if g.is_kept else "no") for g in gates
         ], "gates")]),

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from aqualog.core.records import Remark
 from aqualog.report.sections import Line, Lines, Section
+from aqualog.report.values import counted
 
-__all__ = ["input_sections", "without_remarks"]
+__all__ = ["input_sections", "of_runs", "without_remarks"]
 
+_NAMED = 3  # logs in a line
 _MAY = "values, intervals and verdicts below may change with it"
 
 
@@ -22,6 +24,19 @@ def input_sections(checks: Sequence[Remark]) -> list[Section]:
     lines: list[Line] = [(h, f"{r.what.removeprefix(f'{h} ')}\n{r.advice}") for h, r in zip(heads, checks, strict=True)]
     items = [Lines(brief, where="text"), Lines(lines, most=1000, where="page")]
     return [Section("Check the inputs first", items, "inputs", _MAY, look="problems")]
+
+
+def of_runs(checks: Mapping[str, Sequence[Remark]]) -> str:
+    """The same for many logs in one line, by log; empty without a remark."""
+    doubted = {n: ", ".join(dict.fromkeys(s for r in own for s in r.signals)) for n, own in checks.items() if own}
+    if not doubted:
+        return ""
+    some = [f"{n} ({signals})" for n, signals in list(doubted.items())[:_NAMED]]
+    more = f" and {len(doubted) - _NAMED} more" if len(doubted) > _NAMED else ""
+    what = f"of {counted(len(doubted), 'log')} of {len(checks)}: {', '.join(some)}{more}"
+    return (
+        f"Check the inputs first {what}. Their alarms and verdicts may change with it; `aqualog doctor LOG` says how."
+    )
 
 
 def without_remarks(notes: Sequence[str], checks: Sequence[Remark]) -> list[str]:

@@ -26,7 +26,7 @@ def safe_cell(value: object) -> str:
         return f"{value:.{_DIGITS}g}" if math.isfinite(value) else ""
     text = str(value)
     is_number = text.removeprefix("-").replace(".", "", 1).isdigit()
-    return text if is_number else _FORMULA.sub("'", text)
+    return text if is_number or text == "-" else _FORMULA.sub("'", text)
 
 
 def csv_bytes(frame: pl.DataFrame, *, decimal_comma: bool = False) -> bytes:

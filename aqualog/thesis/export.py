@@ -168,7 +168,8 @@ def claims_csv(conclusions: Sequence[Conclusion]) -> str:
             writer.writerow(
                 (
                     c.claim.id, c.claim.where, c.claim.kind, c.claim.statement, c.verdict, k.part, k.criterion, k.found,
-                    "" if k.value is None else repr(k.value), low, high, k.unit or "-", k.verdict, k.reason, k.source,
+                    "" if k.value is None else repr(float(k.value)), low, high, k.unit or "-", k.verdict, k.reason,
+                    k.source,
                 )
             )  # fmt: skip
     return text.getvalue()

@@ -124,8 +124,7 @@ def conclude(made: Made) -> tuple[Conclusion, ...]:
     ConfigError
         If a claim has no check.
     """
-    # the number of a figure's check stands at the figure, with its interval
-    of_figures = (replace(c, ci95=None, unit="", source=f"figure {f.number}") for f in made.figures for c in f.checks)
+    of_figures = (replace(c, source=f"figure {f.number}") for f in made.figures for c in f.checks)
     of: dict[str, list[Check]] = {}
     for check in (*made.checks, *of_figures):
         of.setdefault(check.claim, []).append(check)

@@ -65,7 +65,7 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
     yaw = mean_over(signals.array("yaw_rate"), _MEAN_S, dt)[until]
     largest = float(np.nanmax(np.abs(yaw))) if np.isfinite(yaw).any() else math.nan
     if largest > limits.yaw_rate:
-        reasons.append(f"the yaw rate reaches {largest:.3f} rad/s {where}, at most {limits.yaw_rate:g} allowed")
+        reasons.append(f"the yaw rate reaches {largest:.4f} rad/s {where}, at most {limits.yaw_rate:g} allowed")
     if math.isnan(largest):
         notes.append("no yaw_rate: whether the car ran straight is not checked, and the slip is not corrected for it")
     shift = _shift(signals, t, t_stop, limits.shift)
@@ -77,7 +77,8 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
     if math.isnan(fall):
         notes.append("no torque of the driven wheels: whether it was cut is not checked")
     elif fall > limits.torque_cut:
-        reasons.append(f"the torque falls by {100 * fall:.0f} % within a second {where}: it was cut")
+        by = f"by {100 * fall:.0f} %" if fall < 1.0 else "below zero"
+        reasons.append(f"the torque falls {by} within a second {where}: it was cut")
     return Seen(tuple(reasons), tuple(notes), a_x, largest)
 
 

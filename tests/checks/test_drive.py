@@ -85,6 +85,12 @@ def test_a_driven_axle_that_no_vehicle_file_says_is_proposed_not_assumed():
     assert said(bare, drop=TORQUES) == []  # wheels that slip say less than a torque
 
 
+def test_a_drive_of_24_s_shows_the_driven_axle():
+    short = {n: x[:480] for n, x in DRIVE.items()} | {n: np.zeros(480) for n in ("torque_fl", "torque_fr")}
+    (remark,) = (r for r in look(signals(short), replace(KNOWN, drivetrain="fwd")) if r.kind == "drivetrain")
+    assert remark.what == "the vehicle file says fwd, but the front wheels are never driven"
+
+
 def test_without_a_drivetrain_in_the_file_nothing_is_said_of_it():
     bare = replace(CAR, drivetrain="fwd", given=frozenset({"mass"}))
     assert exchanged(DRIVE, bare, TORQUES) == []

@@ -38,6 +38,16 @@ def test_a_short_drive_shows_a_unit(seed):
     assert "deg/s read as rad/s" in found[1 / DEGREE][0].what
 
 
+def test_front_wheels_that_slip_on_water_are_no_turning():
+    drive = made(seconds=24.0, accelerating=0.2, turning=0.002)
+    slips = 0.04 * np.clip(np.sin(np.arange(480) * 0.08), 0.0, None)
+    drive |= {"omega_fr": drive["omega_fr"] * (1.0 - slips), "yaw_rate": -0.3 * slips}
+    drop = ("a_y", "steer_angle", *PLACES)
+    assert look(signals(drive, drop=drop), CAR) == ()
+    # without rear wheels nothing speaks against it
+    assert ("yaw_rate",) in [r.signals for r in look(signals(drive, drop=(*drop, *WHEELS[2:])), CAR)]
+
+
 def test_the_line_has_the_right_unit():
     origin = Origin("yaw_rate", "Gyro", "a.mf4", "rad/s", 20.0, 1, mapped={"channel": ["Gyro"], "unit": "rad/s"})
     (remark,) = remarks(yaw_rate=1 / DEGREE, origins={"yaw_rate": origin})

@@ -38,7 +38,7 @@ def test_the_printed_tables(tmp_path):
 
 def test_one_line_says_why_no_table_is_written(table, tmp_path):
     folder = table.parent
-    run("inspect", table, "--csv", "c.csv", cwd=tmp_path)
+    run("inspect", table, "--csv", "c", cwd=tmp_path)
     before = (tmp_path / "c.csv").read_bytes()
     refused = {
         ("--csv", "c.csv"): "c.csv: exists already",

@@ -148,6 +148,7 @@ def test_measured_drives_hold_no_such_run(car, test, real_logs, tmp_path):
     ("arguments", "words"),
     [(("straight", LOG), "no vehicle"),
      (("straight", "CAMPAIGN", "--control", "SRT"), 'no run has the control tyre "SRT"'),
+     (("straight", "CAMPAIGN", "--index", "50"), "an index without a control"),
      (("straight", "CAMPAIGN", "--by", "tire"), 'did you mean "tyre"'),
      (("curve", "CAMPAIGN", "--result", "most"), "min, mean, area"),
      (("braking", "CAMPAIGN", "--from", "20", "--to", "80"), "from a higher to a lower speed"),

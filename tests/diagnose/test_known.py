@@ -58,7 +58,7 @@ def test_a_guess_that_is_far_off_gets_no_name(monkeypatch, gain):
     d = diagnose([("a", log)], replace(CAR, **off, provenance=UNSURE), options=QUICK)
     assert (d.verdict, d.causes) == ("no_effect", ())
     assert any(
-        n.startswith("An uncertain value of the vehicle file is likeliest on these drives with tyre radius")
+        "The verdict holds with what fits best: tyre radius" in n
         for n in d.notes
     )
     assert " It does with " in d.sentence

@@ -149,7 +149,8 @@ def choose_time(fields: Sequence[TableField], options: ReadOptions, *, where: st
             what = f'column "{text.name}" is no time: too many of its cells are no numbers'
             hint = f"look for lines with another separator or decimal mark; {_NAME.format(text.name)} reads the others"
             raise LogError(what, where=where, expected="times as numbers or dates", hint=hint)
-        raise LogError(f"no time column{asked} among: {listed}", where=where, expected="t [s] or time", hint=_HINT)
+        among = f" among: {listed}" if listed else ": the table has no column"
+        raise LogError(f"no time column{asked}{among}", where=where, expected="t [s] or time", hint=_HINT)
     unit = options.time_unit or _own_unit(fields[found])
     if options.time_unit and not (is_unit(unit) and parse_unit(unit).dimension == "time"):
         raise ConfigError(f'"{unit}" is no unit of time', where=where, expected="s, ms, us or ns", hint="[time] unit")

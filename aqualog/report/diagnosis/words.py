@@ -141,7 +141,7 @@ def _test(s: Mapping[str, Any] | None) -> list[str]:
     beyond = s["statistic"] is not None and s["threshold"] is not None and s["statistic"] > s["threshold"]
     said = [
         f"Known effects explain {'more' if beyond else 'no more'} than noise: largest test value "
-        f"{short(s['statistic'])}, threshold {short(s['threshold'])}, p {'≈' if p == 0.0 else '='} {short(p)}."
+        f"{short(s['statistic'])}, threshold {short(s['threshold'])}, p {'< 1e-12' if p <= 1e-12 else f'= {short(p)}'}."
     ]
     asked = f"False alarm level {short(s['level'])}"
     if s["achieved_level"] is None:
