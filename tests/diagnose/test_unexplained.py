@@ -18,10 +18,10 @@ from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
-from aqualog.diagnose.sets import Fitted
+from aqualog.diagnose.sets import Fitted, fitted_in
 from aqualog.diagnose.shapes import MECHANISMS
 from aqualog.diagnose.spectrum import weighing
-from aqualog.diagnose.unexplained import unknown_forms
+from aqualog.diagnose.unexplained import LEAST, unknown_forms
 from aqualog.diagnose.unknown_term import as_term
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
@@ -145,9 +145,12 @@ def test_a_hump_in_speed_is_a_force_over_speed(monkeypatch):
     assert r.nearest in {h.key for h in ASKED}
     assert "goes with speed" in r.sentence
     assert unknown_forms(a, p, seed=1)[0].high.tolist() == r.high.tolist()
-    # what it explains may be small where the function is large
-    monkeypatch.setattr(unexplained, "LEAST", dict.fromkeys(unexplained.LEAST, 10.0))
-    for worth, count in ((2.0, 1), (100.0, 0)):
+    # what it explains may be smaller where the function is surely large
+    own = [m for m in p.best if a.blocks[m].kind == "shape"]
+    size, *_ = unexplained._where(a, own, p.best, fitted_in(a.blocks, p.tolerant, p.best))
+    for times, worth, count in ((1.5, 2.0, 1), (1.5, 100.0, 0), (2.5, 2.0, 0)):
+        least = {unit: times * size * x for unit, x in LEAST.items()}
+        monkeypatch.setattr(unexplained, "LEAST", least)
         monkeypatch.setattr(unexplained, "WORTH", worth)
         assert len(unknown_forms(a, p, seed=1)) == count
     monkeypatch.undo()
@@ -250,9 +253,9 @@ def test_what_the_wheels_do_shows_in_their_slip(mechanism, channel):
     field = SimpleNamespace(
         parts=(part,), blocks=(block,), shapes=(shape,), drawn=lambda *_: f, mechanism=lambda _: shape.mechanism
     )
-    is_large, share, where = unexplained._where(field, [0], [0], Fitted([0], np.ones(1), np.eye(1)))
+    size, share, where = unexplained._where(field, [0], [0], Fitted([0], np.ones(1), np.eye(1)))
     assert where == channel
-    assert (is_large, share > 0.9) == ((True, True) if channel == "kinematic" else (False, False))
+    assert (size > 1.0, share > 0.9) == ((True, True) if channel == "kinematic" else (False, False))
 
 
 @pytest.mark.parametrize(
@@ -374,14 +377,15 @@ def test_what_is_no_smooth_function_in_one_channel_may_show_in_another():
     acts, noise = np.arange(n) < 600, rng.standard_normal((2, n))
     offset, wave = 0.3 * acts * (1.0 + 0.1 * rng.standard_normal(n)), 0.008 * np.sin(np.arange(n) / 30.0)
     y = np.stack([0.3 * acts, wave]) + [[0.02], [0.006]] * noise
-    is_large, share, channel = shown(("force_balance", "kinematic"), y, [np.stack([offset, wave])], [""])
-    assert (is_large, channel) == (False, "kinematic")
+    size, share, channel = shown(("force_balance", "kinematic"), y, [np.stack([offset, wave])], [""])
+    assert (size > 1.0, channel) == (False, "kinematic")
     assert share > 0.3
     # beside an interval a smooth function need not vary: their sum is an offset that begins
     inside = [0.004 * np.sin(np.arange(n) / 17.0)[None], 0.2 * acts[None]]
     for order in (1, -1):
         found = shown(("force_balance",), inside[1] + 0.03 * noise[:1], inside[::order], ["", "for 60 s"][::order])
-        assert found[:2] == (True, pytest.approx(0.88, abs=0.03))
+        assert found[0] > 1.0
+        assert found[1] == pytest.approx(0.88, abs=0.03)
     few = 2.0 * (np.arange(n) < 12)[None]
     again = few * (1.0 + 0.1 * rng.standard_normal(n))
     assert shown(("force_balance",), few + 0.02 * noise[:1], [again], [""])[1] == 0.0
