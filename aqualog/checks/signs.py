@@ -77,7 +77,7 @@ def _velocity(windows: Windows) -> Iterator[Doubt]:
     if int(against.sum()) < LEAST_AGAINST or share < MOSTLY:
         return
     own = ("v_x",) if float(np.median(v[against])) < 0.0 else tuple(f"omega_{w}" for w in windows.wheels)
-    what = f"v_x has the opposite sign of the wheels in {share:.0%} of the time in which both move"
+    what = f"v_x has the opposite sign of the wheels in {100.0 * share:.0f} % of the time in which both move"
     yield Doubt("sign", own, what, "forward is positive", ways=(dict.fromkeys(own, TURN),), value=share)
 
 

@@ -33,10 +33,8 @@ def of_runs(checks: Mapping[str, Sequence[Remark]]) -> str:
         return ""
     some = [f"{n} ({signals})" for n, signals in list(doubted.items())[:_NAMED]]
     more = f" and {len(doubted) - _NAMED} more" if len(doubted) > _NAMED else ""
-    what = f"of {counted(len(doubted), 'log')} of {len(checks)}: {', '.join(some)}{more}"
-    return (
-        f"Check the inputs first {what}. Their alarms and verdicts may change with it; `aqualog doctor LOG` says how."
-    )
+    what = f"Check the inputs of {len(doubted)} of {counted(len(checks), 'log')} first: {', '.join(some)}{more}."
+    return f"{what} Alarms and verdicts may change with them; `aqualog doctor LOG` says how."
 
 
 def without_remarks(notes: Sequence[str], checks: Sequence[Remark]) -> list[str]:

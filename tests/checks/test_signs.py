@@ -34,7 +34,7 @@ def test_with_wheels_the_turned_signals_are_named(turned):
 def test_a_velocity_against_the_wheels(turned):
     (first, *_) = look(signals(DRIVE, turned=turned), CAR)
     assert (first.kind, first.signals, first.lines) == ("sign", turned, tuple(line(s) for s in turned))
-    assert "v_x has the opposite sign of the wheels in 100%" in first.what
+    assert "v_x has the opposite sign of the wheels in 100 %" in first.what
 
 
 @pytest.mark.parametrize("turned", ["a_y", "yaw_rate"])

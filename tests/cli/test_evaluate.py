@@ -2,6 +2,7 @@
 
 import json
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import polars as pl
 import pytest
@@ -9,6 +10,8 @@ import pytest
 from tests import commands
 from tests.commands import error_lines
 from tests.evaluate.made import write_campaign
+
+SAMPLES = Path(__file__).parents[2] / "sample_logs"
 
 
 def run(*args):
@@ -196,3 +199,17 @@ def test_a_wrong_gate_is_refused_before_any_work(folder, options, text):
     done = run(folder / "gone.toml", *options)
     assert done.exit_code == 2
     assert text in error_lines(done)[0]
+
+
+def test_inputs_that_do_not_fit_are_named_with_alarms_and_runs(tmp_path):
+    map_ = (SAMPLES / "map_csv.toml").read_text(encoding="utf-8")
+    (tmp_path / "map.toml").write_text(map_.replace('"v_Referenz"', '{ channel = "v_Referenz", scale = -1.0 }'))
+    (tmp_path / "dry.csv").write_text("start_s,end_s,effect,wheel\n")
+    given = (SAMPLES / "lane_drive.csv", "--signals", tmp_path / "map.toml", "--vehicle", SAMPLES / "vehicle.toml")
+    for found in (
+        run(*given, "--labels", tmp_path / "dry.csv"),
+        commands.run("batch", *given, "-o", tmp_path / "store"),
+    ):
+        assert "Check the inputs of 1 of 1 log first: " in found.stdout
+        assert "lane_drive.csv (v_x). Alarms and verdicts may change" in found.stdout
+    assert "tie_rod          -       no run can be judged" in found.stdout
