@@ -179,7 +179,7 @@ _PAIR = ("a_x", "a_y")
 _LIKE_AN_OFFSET = (("road_grade", "rolling_resistance"), ("road_grade", "brake_drag"))
 # the side slip's part of a_y, (l_r - m l_f v^2 / (c_r l)) times the yaw acceleration, looks like a delay against the
 # gyro: a cornering stiffness that is off by a third moves it by 0.05 s at 40 m/s (D)
-_SIDE_SLIP = {"a_y": 0.05, "yaw_rate": 0.05}
+_SIDE_SLIP = {"a_y": 0.05}
 # Tolerances are given where a vehicle file or a simulator errs by more than a third of the smallest size: slip slopes
 # change by 5 % with a few degrees, the driveline turns with the wheels, a filter and half a sample, 10 ms, lie
 # between two buses, scrub and crowned roads differ, tyres follow their load by other laws, warm up and grow a little

@@ -184,6 +184,7 @@ EFFECTS: dict[str, Callable[[World, Values, str | None], World]] = {
     "accelerometer_bias": _of_signal("a_x", lambda e, v: replace(e, bias=e.bias + v["bias"])),
     "accelerometer_gain": _of_signal("a_x", lambda e, v: replace(e, gain=e.gain * v["gain"])),
     "accelerometer_drift": _of_signal("a_x", lambda e, v: replace(e, drift=e.drift + v["drift"])),
+    "accelerometer_position": _of_signal("a_x", lambda e, v: replace(e, ahead=e.ahead + v["ahead"])),
     "signal_delay": _of_signal("v_x", lambda e, v: replace(e, delay=e.delay + v["delay"])),
     "tone_ring": lambda w, v, where: _signal(
         w, tuple(GROUPS["omega"][i] for i in _PLACES[where]), lambda e: replace(e, ring=e.ring + v["amplitude"])

@@ -35,6 +35,7 @@ _KNOWN = (
     _each("accelerometer_bias", ("a_x", {"bias": 0.15}), ("a_x", {"bias": -0.12}), ("a_x", {"bias": 0.3})),
     _each("accelerometer_gain", ("a_x", {"gain": 1.05}), ("a_x", {"gain": 0.95}), ("a_x", {"gain": 1.08})),
     _each("accelerometer_drift", ("a_x", {"drift": 6e-4}), ("a_x", {"drift": -5e-4})),
+    _each("accelerometer_position", ("a_x", {"ahead": 2.0}), ("a_x", {"ahead": -2.5})),
     _each("signal_delay", ("a_x", {"delay": 0.08}), ("v_x", {"delay": 0.2}), ("torque", {"delay": 0.1}),
           ("omega", {"delay": 0.08})),
     _each("tone_ring", ("fl", {"amplitude": 0.004}), ("rr", {"amplitude": 0.003}), ("f", {"amplitude": 0.003})),
@@ -82,7 +83,7 @@ _SHOWN_BY = {
     "tyre_radius_growth": ("mixed", "motorway"), "clock_skew": _LIVELY, "torque_gain": _LIVELY,
     "payload_mass": _LIVELY, "slip_saddle": _LIVELY, "gear_loss": _LIVELY, "accelerometer_speed": _LIVELY,
     "speed_hump": ("mixed",), "drag_patch": ("mixed",), "hills": ("mixed",), "trailer": ("mixed", "motorway"),
-    "pressure_loss": ("mixed", "motorway", "handling"),
+    "pressure_loss": ("mixed", "motorway", "handling"), "accelerometer_position": ("handling",),
 }  # fmt: skip
 SUITED: dict[str, tuple[str, ...]] = {name: _SHOWN_BY.get(name, _ANY) for name in POOLS}
 """Programmes that excite an effect; elsewhere `cannot_tell` or `no_effect` may be the right answer."""

@@ -56,6 +56,8 @@ def _seen(rows, name, e, t, v_true, rng):
     if e.ring != 0.0:
         phase = rng.uniform(0.0, 2.0 * np.pi, 4)[OMEGAS.index(name)]
         x = x * (1.0 + e.ring * np.sin(rows[:, OUT[name.replace("omega", "angle")]] + phase))
+    if e.ahead != 0.0:
+        x = x - e.ahead * rows[:, OUT["yaw_rate"]] ** 2
     if e.speed_gain != 0.0:
         x = x * (1.0 + e.speed_gain * (v_true - 15.0))
     if e.delay != 0.0 or e.skew_ppm != 0.0:

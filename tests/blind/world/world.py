@@ -32,7 +32,10 @@ TYRE = {name: i for i, name in enumerate((
 
 @dataclass(frozen=True, slots=True)
 class Errors:
-    """Systematic errors of one sensor: y = gain x (1 + speed_gain (v - 15 m/s)) + bias + drift t, late by `delay`."""
+    """Systematic errors of one sensor: y = gain x (1 + speed_gain (v - 15 m/s)) + bias + drift t, late by `delay`.
+
+    `ahead` of the centre of gravity [m] an accelerometer has x - ahead r^2 for x, with the yaw rate r.
+    """
 
     gain: float = 1.0
     bias: float = 0.0
@@ -41,6 +44,7 @@ class Errors:
     skew_ppm: float = 0.0
     speed_gain: float = 0.0
     ring: float = 0.0
+    ahead: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
