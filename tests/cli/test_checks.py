@@ -1,6 +1,7 @@
 """Commands say what does not fit among the signals, and take off offsets where they are asked to."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from tests import commands
 from tests.checks.made import CAR, DT, made, signals
 from tests.diagnose.stand_in import Engine
 
+SAMPLES = Path(__file__).parents[2] / "sample_logs"
 BRAKES = np.zeros(round(600.0 / DT))
 
 
@@ -130,3 +132,33 @@ def test_align_takes_a_map_with_the_clocks_of_other_files(folder, tmp_path):
     assert (code, "fits no file" in err) == (0, False), err
     with pytest.raises(aq.AqualogError, match=r'\[sources\."gps\.csv"\] fits no file; the files are drive\.csv'):
         aq.read(folder / "drive.csv", map=path)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (
+            lambda head, rows: (head.replace("[s]", "[ms]"), rows),
+            "time stamps are 1.0e-05 s apart; expected 5e-05 s or more",
+        ),
+        (
+            lambda head, rows: (head, [f"0,0;{r.partition(';')[2]}" for r in rows]),
+            "no signal has two samples at different times",
+        ),
+        (lambda head, rows: (head, rows[::100]), "(the log has 1 Hz); expected"),
+        (
+            lambda head, rows: (head.replace("U/min", "rad/s"), rows),
+            "are left out: all of them, its unit or its sign is wrong",
+        ),
+    ],
+    ids=["unit of time", "one time", "1 Hz", "unit of wheels"],
+)
+def test_what_no_car_logs_is_said(tmp_path, change, words):
+    head, *rows = (SAMPLES / "lane_drive.csv").read_text(encoding="utf-8").splitlines()
+    head, rows = change(head, rows)
+    (tmp_path / "odd.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
+    given = ("--signals", SAMPLES / "map_csv.toml", "--vehicle", SAMPLES / "vehicle.toml")
+    found = commands.run("detect", tmp_path / "odd.csv", *given)
+    said = found.stdout + found.stderr
+    assert words in said
+    assert "odd.csv" in said

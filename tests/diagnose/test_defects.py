@@ -1,5 +1,7 @@
 """An accelerometer that is not one is exposed; one that is only off, late or tilted is not."""
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pytest
@@ -52,6 +54,14 @@ def test_another_channel_is_a_defect():
 def test_a_lag_is_found():
     d = judged(lambda a: -np.roll(a, 50))
     assert d.lag_s == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_stretches_that_the_torque_does_not_explain_count_too(sign):
+    log = plain()
+    d = prepare(changed(log, log.frame.with_columns(pl.col("a_x") * sign)), CAR, "a")
+    found = accelerometer_defect(replace(d, mask=np.zeros_like(d.mask)))
+    assert (found is None) == (sign > 0.0)
 
 
 def test_a_drive_at_one_speed_tells_nothing():

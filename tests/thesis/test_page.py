@@ -6,6 +6,7 @@ import hashlib
 import io
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -195,6 +196,13 @@ def test_documents_of_claims():
     rows = list(csv.DictReader(io.StringIO(claims_csv(found))))
     assert len(rows) == 120  # two of the figures
     assert {r["claim"] for r in rows} == set(claims())
+    # the number of a figure has its unit and interval there, too
+    sized = [replace(k, value=np.float64(0.3), ci95=(0.2, 0.4), unit="m/s^2") for k in m.figures[0].checks]
+    m = replace(m, figures=(replace(m.figures[0], checks=tuple(sized)), *m.figures[1:]))
+    rows = csv.DictReader(io.StringIO(claims_csv(conclude(m))))
+    of_figure = [r for r in rows if r["source"] == f"figure {m.figures[0].number}"]
+    assert len(of_figure) == len(sized) > 0
+    assert {(r["value"], r["low"], r["high"], r["unit"]) for r in of_figure} == {("0.3", "0.2", "0.4", "m/s^2")}
 
 
 @pytest.mark.browser

@@ -118,6 +118,7 @@ REASONS = {
     "yaw": (lambda: broken("yaw_rate", 0.2, slice(500, 560)), "yaw rate reaches 0.200"),
     "shift": (lambda: broken("gear", 4.0, slice(600, None)), "gear changes within 0.3 s"),
     "cut": (lambda: broken("torque_fl", 0.0, slice(540, 580)), "torque falls by 50 %"),
+    "braked": (lambda: broken("torque_fl", -2000.0, slice(540, 580)), "torque falls below zero within a second"),
     "gap": (lambda: broken("omega_fl", np.nan, slice(540, 580)), "wheel speeds are missing for 0.40 s"),
     "idle": (lambda: straight(a=0.1), "0.10 m/s²: no full throttle"),
     "fast": (lambda: straight(v_15=64.5, slope=0.5), "after the lane began"),
