@@ -25,15 +25,7 @@ _JUDGED = (14.0, -1.0)  # [m/s], [m/s^2] above which the measure of the resistan
 
 
 class Checks:
-    """Gather a drive piece by piece, and say at its end what does not fit.
-
-    Parameters
-    ----------
-    available : collection of str
-        Symbols of the drive.
-    dt : float
-        [s]
-    """
+    """Gather a drive piece by piece, and say at its end what does not fit. `available`: its symbols; `dt` [s]."""
 
     def __init__(self, available: Collection[str], vehicle: Vehicle, dt: float) -> None:
         self._gather = Gather([*available, EXTRA], vehicle, dt)

@@ -64,15 +64,7 @@ def middle(rows: list[FloatArray]) -> FloatArray:
 
 
 class Gather:
-    """Take a drive piece by piece and keep its windows; how it is cut does not matter.
-
-    Parameters
-    ----------
-    available : collection of str
-        Symbols of the drive.
-    dt : float
-        [s]
-    """
+    """Take a drive piece by piece and keep its windows, however it is cut. `available`: its symbols; `dt` [s]."""
 
     def __init__(self, available: Collection[str], vehicle: Vehicle, dt: float) -> None:
         self._vehicle = vehicle

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from aqualog.checks.several import OfDrives
     from aqualog.core.records import Signals
     from aqualog.diagnose.records import Diagnosis as Found
+    from aqualog.diagnose.records import ResidualView
     from aqualog.model.term import Model
     from aqualog.report.sections import Report
 
@@ -115,9 +116,13 @@ class Diagnosis(Result):
         }  # fmt: skip
 
     def _report(self) -> Report:
+        return self._sections(())
+
+    def _sections(self, views: Sequence[ResidualView]) -> Report:
+        from aqualog.checks.several import distinct
         from aqualog.report.diagnosis.sections import diagnosis_report
 
-        return diagnosis_report(self.document)
+        return diagnosis_report(self.document, views, [r for _, r in distinct(self.checks)])
 
     def headline(self) -> str:
         from aqualog.report.diagnosis.words import effect_title, sentences
@@ -149,7 +154,6 @@ class Diagnosis(Result):
 
     def files(self) -> Writers:
         """Return `diagnosis.json`, `model.toml` and `diagnosis.html`."""
-        from aqualog.report.diagnosis.sections import diagnosis_report
         from aqualog.report.page import report_page
 
         drives = self.found.drives
@@ -157,9 +161,7 @@ class Diagnosis(Result):
         return {
             "diagnosis.json": self._json_file(),
             "model.toml": text_file(lambda: _model_text(self.found, self.vehicle_name)),
-            "diagnosis.html": page_file(
-                lambda: report_page(diagnosis_report(self.document, self.found.views), title=title)
-            ),
+            "diagnosis.html": page_file(lambda: report_page(self._sections(self.found.views), title=title)),
         }
 
     def save(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:

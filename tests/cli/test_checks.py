@@ -66,6 +66,24 @@ def test_every_command_says_it_alike(folder, command, engine):
         assert {c["drive"] for c in result["checks"]} == {"drive.csv"}
 
 
+def test_a_verdict_on_doubtful_inputs_says_so(folder):
+    _, text, _ = commands.run("detect", folder / "drive.csv", "--vehicle", folder / "car.toml")
+    first = text.splitlines()[0]
+    assert "quaplaning" in first
+    assert first.endswith("; doubtful, check the inputs first")
+    car = aq.Vehicle.read(folder / "car.toml")
+    assert first in aq.detect(aq.read(folder / "drive.csv", vehicle=car), car).headline()
+
+
+def test_what_does_not_fit_stands_before_the_diagnosis(folder, engine, tmp_path):
+    page = tmp_path / "d.html"
+    _, text, _ = commands.run("diagnose", folder / "drive.csv", "--vehicle", folder / "car.toml", "--page", page)
+    for said in (text.lower(), page.read_text(encoding="utf-8").lower()):
+        head = said.index("check the inputs first")
+        assert head < said.index("a_y", head) < said.index("payload", head)
+    assert "a_x (offset)" not in text  # an effect of its own
+
+
 def test_doctor_names_file_and_channel(folder):
     result, _ = document(folder, "doctor")
     (sign,) = (f for f in result["findings"] if f["kind"] == "sign")

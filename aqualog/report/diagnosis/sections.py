@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from aqualog.core.records import Remark
 from aqualog.diagnose.records import ResidualView
 from aqualog.model.effects import EFFECTS
 from aqualog.report.diagnosis.figures import plots
@@ -21,6 +22,7 @@ from aqualog.report.diagnosis.words import (
     untested_by_reason,
     verdict_title,
 )  # fmt: skip
+from aqualog.report.inputs import input_sections
 from aqualog.report.sections import Bar, Bars, Beside, Figures, Headline, Lines, Para, Report, Residuals, Section, Table
 from aqualog.report.values import interval_text, measured, number, percent, pretty_unit
 
@@ -28,12 +30,15 @@ __all__ = ["diagnosis_report"]
 
 _LOOKS = {"no_effect": "", "named": "told", "compound": "told", "cannot_tell": "partial", "unexplained": "partial"}
 _DECADES = (-1.0, 2.0)  # range of the bars: limit over smallest size worth naming
+_FOUND_HERE = ("torque", "resistance", "offset")  # kinds of remarks whose causes a diagnosis finds better
 _BEFOREHAND = "from how the log was driven alone, with each effect at its reference size"
 _MOST_LIMITS, _MOST_CONFUSED, _MOST_CHANNELS = 6, 5, 3  # in the terminal
 
 
-def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] = ()) -> Report:
-    """The verdict first, then its basis.
+def diagnosis_report(
+    document: Mapping[str, Any], views: Sequence[ResidualView] = (), checks: Sequence[Remark] = ()
+) -> Report:
+    """What to know before the verdict, the verdict, then its basis.
 
     Parameters
     ----------
@@ -41,6 +46,8 @@ def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] 
         As `diagnosis_document` makes it, or as it was read back from JSON.
     views : sequence of ResidualView
         Residuals for the figures before and after.
+    checks : sequence of Remark
+        What does not fit among the signals, once.
     """
     d, said = document, sentences(document)
     figures = plots(d)
@@ -67,6 +74,7 @@ def diagnosis_report(document: Mapping[str, Any], views: Sequence[ResidualView] 
         Lines(said["unexplained"]), Figures([x for x in figures if x.startswith("remainder-")]),
     ], "unexplained-section")  # fmt: skip
     sections = [
+        *input_sections([c for c in checks if c.kind not in _FOUND_HERE]),
         Section("", [Lines(said["caution"])], "caution", look="problems"),
         Section("", [head], "verdict", look=f"verdict {_LOOKS.get(d['verdict'], 'open')}"),
         *([settle] if d["verdict"] == "cannot_tell" else []),

@@ -55,17 +55,15 @@ def level(judgement: Judgement) -> str:
     return ("full" if any(e.severity == "full" for e in wet) else "partial") if wet else "none"
 
 
-def headline(judgement: Judgement) -> str:
-    """The verdict in one sentence."""
+def headline(judgement: Judgement, *, doubted: bool = False) -> str:
+    """The verdict in one sentence; `doubted` where inputs do not fit each other."""
+    if judgement.verdict == "cannot_be_judged":
+        return f"Aquaplaning cannot be judged: {missing_words(judgement.missing)}"
     wet = judgement.of("aquaplaning")
-    if len(wet) == 1:
-        return f"Aquaplaning: {episode_sentence(wet[0])}"
-    if wet:
-        full = sum(e.severity == "full" for e in wet)
-        return f"Aquaplaning: {counted(len(wet), 'episode')}" + (f", {full} full" if full else "")
-    if judgement.verdict == "none":
-        return "No aquaplaning"
-    return f"Aquaplaning cannot be judged: {missing_words(judgement.missing)}"
+    full = sum(e.severity == "full" for e in wet)
+    many = counted(len(wet), "episode") + (f", {full} full" if full else "")
+    found = f"Aquaplaning: {episode_sentence(wet[0]) if len(wet) == 1 else many}" if wet else "No aquaplaning"
+    return f"{found}; doubtful, check the inputs first" if doubted else found
 
 
 def episode_sentence(episode: Episode) -> str:
