@@ -66,22 +66,15 @@ def test_every_command_says_it_alike(folder, command, engine):
         assert {c["drive"] for c in result["checks"]} == {"drive.csv"}
 
 
-def test_a_verdict_on_doubtful_inputs_says_so(folder):
-    _, text, _ = commands.run("detect", folder / "drive.csv", "--vehicle", folder / "car.toml")
-    first = text.splitlines()[0]
-    assert "quaplaning" in first
+def test_doubts_stand_with_the_verdict(folder, engine, tmp_path):
+    on, page = (folder / "drive.csv", "--vehicle", folder / "car.toml"), tmp_path / "d.html"
+    first = commands.run("detect", *on)[1].splitlines()[0]
     assert first.endswith("; doubtful, check the inputs first")
-    car = aq.Vehicle.read(folder / "car.toml")
-    assert first in aq.detect(aq.read(folder / "drive.csv", vehicle=car), car).headline()
-
-
-def test_what_does_not_fit_stands_before_the_diagnosis(folder, engine, tmp_path):
-    page = tmp_path / "d.html"
-    _, text, _ = commands.run("diagnose", folder / "drive.csv", "--vehicle", folder / "car.toml", "--page", page)
-    for said in (text.lower(), page.read_text(encoding="utf-8").lower()):
+    assert first in aq.detect(on[0], on[2]).headline()
+    for said in (commands.run("diagnose", *on, "--page", page)[1].lower(), page.read_text(encoding="utf-8").lower()):
         head = said.index("check the inputs first")
         assert head < said.index("a_y", head) < said.index("payload", head)
-    assert "a_x (offset)" not in text  # an effect of its own
+        assert "a_x (offset)" not in said  # an effect of its own
 
 
 def test_doctor_names_file_and_channel(folder):
