@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aqualog.checks.delays import delay_doubts
 from aqualog.checks.doubts import Doubt, remarks_of
 from aqualog.checks.drive import drive_doubts
 from aqualog.checks.signs import sign_doubts
@@ -70,6 +71,7 @@ def _doubts(windows: Windows) -> list[Doubt]:
     wrong = {s for d in (*scales, *signs) if d.kind in ("scale", "channel") for s in d.signals}
     rest = windows.without(wrong & {"a_x"} and {"a_x", EXTRA})
     found = [*signs, *(d for d in offsets if not wrong & {*d.signals}), *scales, *drive_doubts(rest)]
+    found += [d for d in delay_doubts(windows) if not wrong & {*d.signals}]
     # one exchange of wheels at a time: lines for two of them would not fit each other
     wheels = sorted((d for d in found if is_of_wheels(d)), key=in_turn)
     return [d for d in found if d not in wheels[1:]]

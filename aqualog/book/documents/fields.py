@@ -253,7 +253,11 @@ _EVIDENCE = (
 )
 
 _CHECK = (
-    text("kind", "what is in doubt", ("sign", "exchange", "offset", "scale", "torque", "drivetrain", "resistance")),
+    text(
+        "kind",
+        "what is in doubt",
+        ("sign", "exchange", "offset", "scale", "channel", "delay", "torque", "drivetrain", "resistance"),
+    ),
     several("signals", "signals, or keys of the vehicle file"),
     text("what", "what does not fit"),
     text("advice", "what to do"),
