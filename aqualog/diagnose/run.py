@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.checks.delays import delays_in
 from aqualog.checks.follows import Follow, follow
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.records import FloatArray, Signals
@@ -27,11 +26,12 @@ from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.grade import HILLY, Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
+from aqualog.diagnose.late import found_late
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
 from aqualog.diagnose.outcome import conclude, with_causes
-from aqualog.diagnose.records import SURE, Consequence, Diagnosis, Gain, Remainder, ResidualView
+from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView
 from aqualog.diagnose.refit import Refit, likeliest, metric
 from aqualog.diagnose.run_information import Rival
 from aqualog.diagnose.search import Found, Option, Tell, search, simulated
@@ -39,7 +39,7 @@ from aqualog.diagnose.slow_force import slow_force
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unknown_term import as_term, short_form
-from aqualog.diagnose.verdict import Outcome, doubted
+from aqualog.diagnose.verdict import Outcome
 from aqualog.diagnose.words import term_words, verdict_sentence
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
@@ -106,35 +106,35 @@ def diagnose(
     notes += tuple(f"Known: {term_words(t)}." for t in model.terms[len(given.terms) :])
     if reason := _unusable(ready, drives):
         return _not_testable(ready, model, reason, notes, vehicle)
-    if model.terms:
+    names = {d.name for d in ready}
+    late = found_late([s for n, s in drives if n in names], vehicle, model)
+    if (model := Model((*model.terms, *late.terms))).terms:
         ready = [led_by(d, model) for d in ready]
-    evidence, model, bare, roads, untested, about = _simulated(ready, model, tell)
+    evidence, model, shifted, roads, untested, about = _simulated(ready, model, tell)
+    bare = late.without(shifted)
     ready, notes = list(evidence.drives), notes + about
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
     notes += competing(found.arena.parts, ready)
     found, outcome = _with_slow_force(found, conclude(found, model), model)
     chosen = outcome.best.option.refit if outcome.best else None
     agreed = () if chosen is None else agreements(found, chosen)
-    causes = tuple(widened(c, agreed) for c in outcome.causes)
-    outcome, named = outcome._replace(causes=causes), {c.key for c in causes}
-    if outcome.verdict in ("named", "compound") and contradicted(causes, agreed):
-        why = "Not named: the drives contradict each other, see drive by drive."
-        outcome = outcome._replace(verdict="cannot_tell", certain=frozenset(), notes=(*outcome.notes, why))
+    outcome = _agreed(outcome, agreed)
+    named = {c.key for c in outcome.causes}
     quiet = evidence.residuals if chosen is None else chosen.residuals
     noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, ready, strict=True)]
-    named_too, names = _extended(outcome, chosen, (), bare, evidence.asked), {d.name for d in ready}
+    named_too = _extended(outcome, chosen, (), shifted, evidence.asked)
     for d in (d for d in ready if d.name in roads):
         outcome = _with_road(outcome, _road(d, named_too, roads[d.name].drive) or roads[d.name])
-    outcome = doubted(outcome, [x for n, s in drives if n in names for x in delays_in(s, vehicle)], model)
+    outcome = late.beside(outcome)
     hilly = {c.drives for c in outcome.causes if c.effect == "road_grade" and "grade_rms" in c.parameters}
     other = [r.term for r in roads.values() if r.cause.drives not in hilly]
-    with_roads = Model(tuple(t for t in model.terms if t not in other)) if hilly else bare
+    with_roads = Model(tuple(t for t in model.terms if t not in other)) if hilly else shifted
     extended = _extended(outcome, chosen, found.forms, with_roads, evidence.asked)
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
     outcome, forms = joined(outcome, seen), (*found.forms, *seen.forms)
     least = isolate.likelier_than_none(evidence, found.arena.blocks, tolerant(evidence, COARSE * found.plain))
     sizes = isolate.reference_sizes(evidence, found.gram, found.calibration.threshold, least)
-    before = [_led(d, bare) if d.name in roads else residual(d, model) for d in ready]
+    before = [_led(d, bare) if d.name in roads or late.causes else residual(d, model) for d in ready]
     differs, is_unclear = extended.terms != bare.terms, outcome.verdict == "cannot_tell"
     alone, settled, after = _at_likeliest(found, evidence, bare, extended) if differs else (bare, extended, before)
     tell("searching for a run that distinguishes the causes" if is_unclear else "measuring the gain", 0.8)
@@ -146,7 +146,7 @@ def diagnose(
         last.append(lambda: next_manoeuvre(evidence, rivals, noises, model))
     done = beside(lambda f: f(), last)
     gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
-    outcome = _by_gain(outcome, gained, frozenset(c.effect for c in seen.causes))
+    outcome = _by_gain(outcome, gained, frozenset(c.effect for c in (*seen.causes, *late.causes)))
     p, reason = found.significance.p_value, f" ({short_form(forms[0])})" if forms else ""
     sentence = verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
@@ -208,6 +208,15 @@ def _simulated(
     if water is not None and water.effect.belongs == "tyre" and not ready[0].vehicle.water:
         notes += (f"On water the drive is likeliest with {term_words(water)}. {_WET}",)
     return supported(evidence), model, bare, roads, untested, notes
+
+
+def _agreed(outcome: Outcome[Option], agreed: Sequence[Agreement]) -> Outcome[Option]:
+    """The outcome with intervals that hold for all drives, without a name that they contradict."""
+    outcome = outcome._replace(causes=tuple(widened(c, agreed) for c in outcome.causes))
+    if outcome.verdict not in ("named", "compound") or not contradicted(outcome.causes, agreed):
+        return outcome
+    why = "Not named: the drives contradict each other, see drive by drive."
+    return outcome._replace(verdict="cannot_tell", certain=frozenset(), notes=(*outcome.notes, why))
 
 
 def _with_slow_force(found: Found, outcome: Outcome[Option], model: Model) -> tuple[Found, Outcome[Option]]:

@@ -7,18 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, NamedTuple, TypeVar
 
-from aqualog.checks.doubts import Doubt
 from aqualog.diagnose.records import SURE, Alternative, Cause, Verdict, tempered
 from aqualog.diagnose.sets import shares
 from aqualog.diagnose.threads import beside
-from aqualog.model.term import Model
 
-__all__ = ["CREDIBLE", "PLACES", "Candidate", "Causes", "Outcome", "candidates", "decided", "doubted", "whole"]
+__all__ = ["CREDIBLE", "PLACES", "Candidate", "Causes", "Outcome", "candidates", "decided", "whole"]
 
 CREDIBLE = 20.0  # evidence ratio within which places of one effect cannot be distinguished
 PLACES = 5.0  # evidence ratio within which the whole car is preferred to a part of it
 WORTH_SAYING = 0.05  # probability of a set that is not named, from which a note tells of it
-DOUBTED = 0.5  # of a probability beside a signal that comes late, which no set of effects explains (K)
 LEAST_SHARE = 1e-4  # probability of a set, below which its values are not looked at
 
 Option = TypeVar("Option")
@@ -150,17 +147,3 @@ def _likeliest(groups: Sequence[Sequence[Candidate[Option]]]) -> list[str]:
 
 def _small(s: Candidate[Option]) -> tuple[str, ...]:
     return tuple(f"Significant, but too small to be worth naming: {c.sentence}" for c, large in s.causes if not large)
-
-
-def doubted(outcome: Outcome[Option], late: Sequence[Doubt], model: Model) -> Outcome[Option]:
-    """The outcome, in which no cause is certain beside a signal that surely comes late, unless the causes or the model
-    have its delay."""
-    shifted = [(c.effect, c.where) for c in outcome.causes] + [(t.effect.name, t.place) for t in model.terms]
-    known = {where for effect, where in shifted if effect in ("signal_delay", "clock_skew")}
-    late = [d for d in late if not known & {"omega" if x.startswith("omega") else x for x in d.signals}]
-    if not late or not outcome.causes:
-        return outcome
-    why = f"Not certain: {late[0].what}, which these causes do not explain."
-    causes = tuple(replace(c, probability=DOUBTED * c.probability) for c in outcome.causes)
-    verdict: Verdict = "cannot_tell" if outcome.verdict in ("named", "compound") else outcome.verdict
-    return outcome._replace(verdict=verdict, causes=causes, certain=frozenset(), notes=(*outcome.notes, why))

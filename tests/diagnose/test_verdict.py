@@ -4,11 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from aqualog.checks.doubts import Doubt
 from aqualog.diagnose.records import SURE, Cause, Estimate
-from aqualog.diagnose.verdict import candidates, decided, doubted
-from aqualog.model.effects import EFFECTS
-from aqualog.model.term import Model, Term
+from aqualog.diagnose.verdict import candidates, decided
 
 
 def cause(name, where=None, *, large=True):
@@ -84,20 +81,3 @@ def test_the_likeliest_that_is_not_named_is_said_where_no_effect_is_likelier():
     assert (found.verdict, found.causes) == ("no_effect", ())
     assert found.notes == ("Not named, with a probability of 0.12: drag None.",)
     assert verdict([([], 0.0), ([cause("drag")], -4.0)]).notes == ()
-
-
-def test_nothing_is_certain_beside_a_signal_that_comes_late_unexplained():
-    named = verdict([([cause("drag")], 0.0), ([], -40.0)])
-    late = Doubt("delay", ("omega_fl", "omega_fr", "omega_rl", "omega_rr"), "the wheel speeds come 0.4 s after v_x")
-    found = doubted(named, [late], Model())
-    assert found.verdict == "cannot_tell"
-    assert not found.certain
-    assert found.causes[0].probability == 0.5 * named.causes[0].probability
-    assert found.notes[-1].startswith("Not certain: the wheel speeds come 0.4 s after v_x")
-    assert doubted(named, [], Model()) == named
-    known = Model((Term(EFFECTS["signal_delay"], {"delay": 0.4}, "omega"),))
-    assert doubted(named, [late], known) == named
-    shifted = verdict([([cause("signal_delay", "omega")], 0.0), ([], -40.0)])
-    assert doubted(shifted, [late], Model()) == shifted
-    nothing = verdict([([], 0.0), ([cause("drag")], -40.0)])
-    assert doubted(nothing, [late], Model()) == nothing

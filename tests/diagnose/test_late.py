@@ -1,0 +1,73 @@
+"""Delays that the whole drive shows are named first; beside others nothing is certain."""
+
+import pytest
+
+from aqualog.checks.doubts import Doubt
+from aqualog.diagnose.late import found_late
+from aqualog.diagnose.run import Options, diagnose
+from aqualog.model.effects import EFFECTS
+from aqualog.model.term import Model, Term
+from tests.checks.made import CAR, made, signals
+from tests.checks.test_delays import delayed
+from tests.diagnose.test_verdict import cause, verdict
+
+WHEELS = ("omega_fl", "omega_fr", "omega_rl", "omega_rr")
+
+
+def late(*names, drop=()):
+    return found_late([signals(delayed(made(seed=1), names, 0.5), drop=drop)], CAR, Model())
+
+
+def test_one_of_three_is_a_cause_of_its_own():
+    found = late("a_x")
+    (own,) = found.causes
+    assert own.key == "signal_delay@a_x"
+    delay = own.parameters["delay"]
+    assert delay.low < 0.5 < delay.high
+    named = verdict([([cause("drag")], 0.0), ([], -40.0)])
+    both = found.beside(named)
+    assert both.verdict == "compound"
+    assert [c.key for c in both.causes] == ["drag", "signal_delay@a_x"]
+    assert "signal_delay" in both.certain
+    shifted = verdict([([cause("signal_delay", "a_x")], 0.0), ([], -40.0)])
+    assert found.beside(shifted) == shifted
+
+
+def test_what_the_model_has_is_no_finding():
+    known = Model((Term(EFFECTS["signal_delay"], {"delay": 0.5}, "omega"),))
+    drive = signals(delayed(made(seed=1), WHEELS, 0.5))
+    assert not found_late([drive], CAR, known).causes
+    assert found_late([drive], CAR, Model()).causes
+
+
+def test_nothing_is_certain_beside_a_delay_of_one_of_two():
+    found = late("a_x", drop=WHEELS)
+    assert not found.causes
+    named = verdict([([cause("drag")], 0.0), ([], -40.0)])
+    doubted = found.beside(named)
+    assert doubted.verdict == "cannot_tell"
+    assert not doubted.certain
+    assert doubted.causes[0].probability == 0.5 * named.causes[0].probability
+    assert "which these causes do not explain" in doubted.notes[-1]
+    shifted = verdict([([cause("signal_delay", "v_x")], 0.0), ([], -40.0)])
+    assert found.beside(shifted) == shifted
+    nothing = verdict([([], 0.0), ([cause("drag")], -40.0)])
+    assert found.beside(nothing) == nothing
+
+
+def test_of_several_drives_each_has_its_own_clocks():
+    drives = [signals(delayed(made(seed=s), ("v_x",), 0.5)) for s in (0, 1)]
+    found = found_late(drives, CAR, Model())
+    assert not found.causes
+    assert isinstance(found.doubts[0], Doubt)
+
+
+def test_a_drive_with_a_late_velocity(monkeypatch):
+    drive = signals(delayed(made(seconds=300.0, seed=1, v=25.0), ("v_x",), 0.6))
+    found = diagnose([("drive", drive)], CAR, options=Options(surrogates=0, views=False, consequences=False))
+    own = {c.key: c for c in found.causes}
+    assert own["signal_delay@v_x"].parameters["delay"].value == pytest.approx(0.6, abs=0.1)
+    assert found.verdict in ("named", "compound")
+    assert any(t.effect.name == "signal_delay" for t in found.model.terms)
+    kinematic = next(c for c in found.gain.channels if c.channel == "slip_fl")
+    assert kinematic.rmse_after < 0.5 * kinematic.rmse_before
