@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from itertools import permutations
 
 import numpy as np
 
 from aqualog.checks.doubts import Doubt
 from aqualog.checks.relations import changes
 from aqualog.checks.windows import Gather, Windows
-from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 
@@ -22,32 +22,38 @@ CLOSE = 0.8  # correlation at the best lag: below, hills, slip and noise decide 
 PARTS, APART_S = 3, 0.3  # of the drive, whose lags must all agree to that [s]
 LEAST_S = 40.0  # [s] each part longer than the lags on both sides
 LONGITUDINAL = 0.15  # [m/s^2] changes of less are no driving
-_SAID = {"v_x": "v_x comes", "omega": "the wheel speeds come", "a_x": "a_x comes"}
+_SAID = {"v_x": "v_x comes", "omega": "the wheel speeds come", "a_x": "a_x comes", "torque": "the torque comes"}
 _ADVICE = "a filter or another clock: in the signal map, [sources] has offset_s for a file; `aqualog align` finds it"
 
 
 def delays_in(signals: Signals, vehicle: Vehicle) -> list[Doubt]:
     """Return what comes late in a drive, as `delay_doubts`."""
-    own = [s for s in signals.symbols if s in _SAID or s.startswith("omega_")]
+    own = [s for s in signals.symbols if s.startswith(("v_x", "a_x", "omega_", "torque_"))]
     gather = Gather(own, vehicle, signals.dt)
     gather.push({s: signals.array(s) for s in own})
     return [*delay_doubts(gather.windows())]
 
 
 def delay_doubts(windows: Windows) -> Iterator[Doubt]:
-    """Yield the signal that is later than the others, or before them; of two alone, which of them it is stays open."""
+    """Yield the signal that is later than all others, or before them; of two alone, which of them it is stays open."""
     step = windows.step_s
     if any(x.size < LEAST_S / step for x in windows.columns.values()):
         return
+    torques = [windows[n] for n in ("torque_f", "torque_r") if n in windows]
     seen = {"a_x": windows["a_x"]} if "a_x" in windows else {}
     seen |= {"v_x": np.gradient(windows["v_x"], step)} if "v_x" in windows else {}
     seen |= {"omega": np.gradient(windows.speed, step)} if windows.wheels else {}
+    seen |= {"torque": np.sum(torques, axis=0) / (windows.vehicle.mass * windows.vehicle.arm("fl"))} if torques else {}
     moves = {n: changes(x, step) for n, x in seen.items()}
-    for name in moves if len(moves) > 2 else [*moves][:1]:
-        others = [o for o in moves if o != name]
-        lags = [_lag(moves[o], moves[name], step) for o in others]
-        if others and all(math.copysign(1.0, lags[0]) * x >= LATE_S for x in lags):
-            yield _doubt(name, others, sum(lags) / len(lags))
+    lags = {(o, n): _lag(moves[o], moves[n], step) for o, n in permutations(moves, 2)}
+    related = {n: {o: x for (o, late), x in lags.items() if late == n and math.isfinite(x)} for n in moves}
+    most = max(map(len, related.values()), default=0)
+    for name, own in related.items():
+        values = [*own.values()]
+        if len(own) >= min(most, 2) > 0 and all(math.copysign(1.0, values[0]) * x >= LATE_S for x in values):
+            yield _doubt(windows, name, [*own], sum(values) / len(values))
+            if most == 1:
+                return
 
 
 def _lag(x: FloatArray, y: FloatArray, step: float) -> float:
@@ -74,12 +80,14 @@ def _correlation(x: FloatArray, y: FloatArray, k: int) -> float:
     return float(x @ y / np.sqrt((x @ x) * (y @ y)))
 
 
-def _doubt(name: str, others: Sequence[str], lag: float) -> Doubt:
+def _doubt(windows: Windows, name: str, others: Sequence[str], lag: float) -> Doubt:
     than = " and ".join(_SAID[o].rpartition(" ")[0] for o in others)
-    own = [n for s in ([name] if len(others) > 1 else [name, *others]) for n in _symbols(s)]
+    own = [n for s in ([name] if len(others) > 1 else [name, *others]) for n in _symbols(windows, s)]
     what = f"{_SAID[name]} {abs(lag):.1f} s {'after' if lag > 0.0 else 'before'} {than}"
     return Doubt("delay", tuple(own), what, _ADVICE, value=lag)
 
 
-def _symbols(name: str) -> list[str]:
-    return [f"omega_{w}" for w in WHEELS] if name == "omega" else [name]
+def _symbols(windows: Windows, name: str) -> list[str]:
+    if name == "torque":
+        return [n for n in ("torque_f", "torque_r") if n in windows]
+    return [f"omega_{w}" for w in windows.wheels] if name == "omega" else [name]

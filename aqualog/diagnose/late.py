@@ -66,7 +66,7 @@ def found_late(drives: Sequence[Signals], vehicle: Vehicle, model: Model) -> Lat
 
 
 def _places(doubt: Doubt) -> set[str]:
-    return {"omega" if s.startswith("omega") else s for s in doubt.signals}
+    return {s.partition("_")[0] if s.startswith(("omega", "torque")) else s for s in doubt.signals}
 
 
 def _cause(where: str, delay: float) -> Cause:

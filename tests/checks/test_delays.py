@@ -7,9 +7,10 @@ from aqualog.checks.look import look
 from tests.checks.made import CAR, DT, made, signals
 
 WHEELS = ("omega_fl", "omega_fr", "omega_rl", "omega_rr")
+TORQUES = ("torque_rl", "torque_rr")
 
 
-def found(columns, drop=("torque_rl", "torque_rr")):
+def found(columns, drop=TORQUES):
     return {d.signals: d for d in look(signals(columns, drop=drop), CAR) if d.kind == "delay"}
 
 
@@ -36,8 +37,16 @@ def test_one_that_comes_before_the_others():
     assert "a_x comes 0.6 s before v_x and the wheel speeds" in doubt.what
 
 
+def test_a_torque_is_compared_where_the_car_is_driven_not_braked():
+    columns = made(seed=1, accelerating=0.4)
+    (doubt,) = found(delayed(columns, TORQUES, 0.4), drop=()).values()
+    assert doubt.signals == ("torque_r",)
+    assert doubt.value == pytest.approx(0.4, abs=0.1)
+    assert not found(columns, drop=())
+
+
 def test_of_two_alone_either_may_be_wrong():
-    (doubt,) = found(delayed(made(seed=3), ("a_x",), 0.5), drop=WHEELS).values()
+    (doubt,) = found(delayed(made(seed=3), ("a_x",), 0.5), drop=WHEELS + TORQUES).values()
     assert set(doubt.signals) == {"a_x", "v_x"}
 
 

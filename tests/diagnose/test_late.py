@@ -8,10 +8,8 @@ from aqualog.diagnose.run import Options, diagnose
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 from tests.checks.made import CAR, made, signals
-from tests.checks.test_delays import delayed
+from tests.checks.test_delays import TORQUES, WHEELS, delayed
 from tests.diagnose.test_verdict import cause, verdict
-
-WHEELS = ("omega_fl", "omega_fr", "omega_rl", "omega_rr")
 
 
 def late(*names, drop=()):
@@ -41,7 +39,7 @@ def test_what_the_model_has_is_no_finding():
 
 
 def test_nothing_is_certain_beside_a_delay_of_one_of_two():
-    found = late("a_x", drop=WHEELS)
+    found = late("a_x", drop=WHEELS + TORQUES)
     assert not found.causes
     named = verdict([([cause("drag")], 0.0), ([], -40.0)])
     doubted = found.beside(named)
