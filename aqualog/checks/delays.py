@@ -19,9 +19,9 @@ __all__ = ["delay_doubts", "delays_in"]
 LATE_S = 0.2  # [s] GNSS and filters take less (three measured cars: 0.15 and less)
 MOST_S = 3.0  # [s]
 CLOSE = 0.8  # correlation at the best lag: below, hills, slip and noise decide it
-PARTS, APART_S = 3, 0.3  # of the drive, whose lags must all agree to that [s]
+PARTS, APART_S = 3, 0.2  # of the drive, whose lags must all agree to that [s]
 LEAST_S = 40.0  # [s] each part longer than the lags on both sides
-LONGITUDINAL = 0.15  # [m/s^2] changes of less are no driving
+LONGITUDINAL = 0.08  # [m/s^2] changes of less are no driving
 _SAID = {"v_x": "v_x comes", "omega": "the wheel speeds come", "a_x": "a_x comes", "torque": "the torque comes"}
 _ADVICE = "a filter or another clock: in the signal map, [sources] has offset_s for a file; `aqualog align` finds it"
 

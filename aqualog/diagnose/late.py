@@ -1,7 +1,7 @@
-"""Signals that come late by more than a straight line from no delay can say: found first, by the whole drive.
+"""Signals that come so late that the competition did not find it, by the lags of the whole drive.
 
-Lags between velocity, wheels and accelerometer are known to hundredths of a second from curves and braking, too, which
-the force balance leaves out. A competition on tangents would look for them in other effects.
+Lags between velocity, wheels, accelerometer and torque are known to hundredths of a second from curves and braking,
+too, which the force balance leaves out. A competition on tangents may look for them in other effects.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from aqualog.checks.delays import delays_in
 from aqualog.checks.doubts import Doubt
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
+from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.records import MOST, Cause, Estimate, Verdict
 from aqualog.diagnose.verdict import Option, Outcome
 from aqualog.diagnose.words import cause_sentence
@@ -38,6 +39,16 @@ class Late:
     def terms(self) -> tuple[Term, ...]:
         """The delays as terms of a model."""
         return tuple(Term(DELAY, {"delay": c.parameters["delay"].value}, c.where) for c in self.causes)
+
+    def known(self, asked: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+        """Hypotheses, in which such a signal's delay may be off by what the lag leaves open."""
+        own = {c.key for c in self.causes}
+        return tuple(replace(h, room=0.5 * HALF_S) if h.key in own else h for h in asked)
+
+    def beyond(self, causes: Sequence[Cause]) -> Late:
+        """Delays that are not among the causes of a diagnosis, with about this value."""
+        found = {c.key: e for c in causes for n, e in c.parameters.items() if n == "delay"}
+        return Late(tuple(c for c in self.causes if not _agrees(c.parameters["delay"], found.get(c.key))))
 
     def without(self, model: Model) -> Model:
         """A model without them."""
@@ -72,3 +83,7 @@ def _places(doubt: Doubt) -> set[str]:
 def _cause(where: str, delay: float) -> Cause:
     own = {"delay": Estimate(delay, delay - HALF_S, delay + HALF_S, "s")}
     return Cause(DELAY.name, where, own, ("kinematic",), cause_sentence(DELAY, where, own), MOST)
+
+
+def _agrees(lag: Estimate, found: Estimate | None) -> bool:
+    return found is not None and lag.low <= found.value <= lag.high

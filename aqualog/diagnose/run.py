@@ -26,7 +26,7 @@ from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.grade import HILLY, Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
-from aqualog.diagnose.late import found_late
+from aqualog.diagnose.late import Late, found_late
 from aqualog.diagnose.next_manoeuvre import next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
@@ -98,8 +98,18 @@ def diagnose(
     ConfigError
         If two drives have the same name.
     """
-    options, tell = options or Options(), progress or (lambda _text, _share: None)
-    given = model or Model()
+    options, tell, given = options or Options(), progress or (lambda _text, _share: None), model or Model()
+    late = found_late([s for _, s in drives], vehicle, with_known(given, vehicle))
+    found = _diagnosed(drives, vehicle, given, holdout, options, tell, Late(doubts=late.doubts))
+    left = late.beyond(found.causes)
+    return _diagnosed(drives, vehicle, given, holdout, options, tell, left) if left.causes else found
+
+
+def _diagnosed(
+    drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, given: Model, holdout: Sequence[tuple[str, Signals]],
+    options: Options, tell: Tell, late: Late,
+) -> Diagnosis:  # fmt: skip
+    """The diagnosis beside delays that are known from elsewhere."""
     model = with_known(given, vehicle)
     tell("preparing", 0.0)
     ready, notes = _prepared(drives, vehicle)
@@ -107,10 +117,9 @@ def diagnose(
     if reason := _unusable(ready, drives):
         return _not_testable(ready, model, reason, notes, vehicle)
     names = {d.name for d in ready}
-    late = found_late([s for n, s in drives if n in names], vehicle, model)
     if (model := Model((*model.terms, *late.terms))).terms:
         ready = [led_by(d, model) for d in ready]
-    evidence, model, shifted, roads, untested, about = _simulated(ready, model, tell)
+    evidence, model, shifted, roads, untested, about = _simulated(ready, model, late, tell)
     bare = late.without(shifted)
     ready, notes = list(evidence.drives), notes + about
     found = search(evidence, model, level=options.level, surrogates=options.surrogates, seed=options.seed, tell=tell)
@@ -179,7 +188,7 @@ def diagnose(
 
 
 def _simulated(
-    ready: list[Drive], model: Model, tell: Tell
+    ready: list[Drive], model: Model, late: Late, tell: Tell
 ) -> tuple[Evidence, Model, Model, dict[str, Profile], dict[str, str], tuple[str, ...]]:
     """Evidence, model, model without roads, roads by drive, effects that are not tested, and notes: each drive's road
     first, then the effects, around values that the file is not sure of."""
@@ -193,6 +202,7 @@ def _simulated(
     if roads:
         ready = [led_by(d, model) for d in ready]
     asked, untested = hypotheses(ready, model)
+    asked = late.known(asked)
     evidence = simulated(ready, asked, model, tell)
     moved = recentred(evidence, model)
     if moved != model:

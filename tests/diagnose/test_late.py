@@ -4,11 +4,12 @@ import pytest
 
 from aqualog.checks.doubts import Doubt
 from aqualog.diagnose.late import found_late
-from aqualog.diagnose.run import Options, diagnose
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 from tests.checks.made import CAR, made, signals
 from tests.checks.test_delays import TORQUES, WHEELS, delayed
+from tests.diagnose.test_drive import term
+from tests.diagnose.test_run import ask, few, told  # noqa: F401 - `few` is a fixture
 from tests.diagnose.test_verdict import cause, verdict
 
 
@@ -60,12 +61,26 @@ def test_of_several_drives_each_has_its_own_clocks():
     assert isinstance(found.doubts[0], Doubt)
 
 
-def test_a_drive_with_a_late_velocity(monkeypatch):
-    drive = signals(delayed(made(seconds=300.0, seed=1, v=25.0), ("v_x",), 0.6))
-    found = diagnose([("drive", drive)], CAR, options=Options(surrogates=0, views=False, consequences=False))
-    own = {c.key: c for c in found.causes}
-    assert own["signal_delay@v_x"].parameters["delay"].value == pytest.approx(0.6, abs=0.1)
-    assert found.verdict in ("named", "compound")
-    assert any(t.effect.name == "signal_delay" for t in found.model.terms)
-    kinematic = next(c for c in found.gain.channels if c.channel == "slip_fl")
-    assert kinematic.rmse_after < 0.5 * kinematic.rmse_before
+@pytest.mark.parametrize("mass", [0.0, 250.0])
+def test_a_drive_whose_delay_the_competition_does_not_find(monkeypatch, mass):
+    ask(monkeypatch, ("payload_mass", "tyre_radius@fl"))
+    load = (term("payload_mass", delta_mass=mass),) if mass else ()
+    found = told(*load, term("signal_delay", "v_x", delay=0.6))
+    own = {c.key: c.parameters for c in found.causes}
+    assert set(own) == {"signal_delay@v_x"} | ({"payload_mass"} if mass else set())
+    delay = own["signal_delay@v_x"]["delay"]
+    assert delay.low < 0.6 < delay.high
+    assert found.verdict == ("compound" if mass else "named")
+    if mass:
+        assert own["payload_mass"]["delta_mass"].low < mass < own["payload_mass"]["delta_mass"].high
+    assert {t.effect.name for t in found.model.terms} == {k.partition("@")[0] for k in own}
+    slip = next(c for c in found.gain.channels if c.channel == "slip_fl")
+    assert slip.rmse_after < 0.2 * slip.rmse_before
+    assert found.gain.log_score > 100.0
+
+
+def test_a_delay_that_the_competition_finds_keeps_its_interval():
+    found = told(term("signal_delay", "v_x", delay=0.3))
+    (own,) = found.causes
+    assert own.key == "signal_delay@v_x"
+    assert own.parameters["delay"].high - own.parameters["delay"].low < 0.1
