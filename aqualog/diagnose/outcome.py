@@ -19,8 +19,10 @@ from aqualog.diagnose.search import DOUBT, Found, Option, sharpened
 from aqualog.diagnose.sets import Members, fitted_in
 from aqualog.diagnose.shown import repeats
 from aqualog.diagnose.threads import beside
+from aqualog.diagnose.unexplained import MOST
 from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, Causes, Outcome, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence, name_of
+from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 
 __all__ = ["conclude", "with_causes"]
@@ -32,16 +34,17 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
     """The verdict on what a search found.
 
     An unknown form comes before any name; beside it stand the effects of the same set whose probability is 0.95 or
-    more. A name needs that probability too, and must pass the checks of `shown.repeats`. Else the answer is what the
-    posterior consists of, up to 0.95. Sets whose causes worth naming are the same count together. An only answer
+    more, and whose values are not at a physical bound. They hang on a function that is not exactly known, so they are
+    not certain. A name needs that probability too, and must pass the checks of `shown.repeats`. Else the answer is what
+    the posterior consists of, up to 0.95. Sets whose causes worth naming are the same count together. An only answer
     that is not named and leaves the channels larger than it finds them is noise.
     """
     if found.forms:
         linear = _linear(found, found.posterior.best, model)
         share = {n: tempered(p) for n, p in found.posterior.marginal.items()}
         causes = (replace(c, probability=share.get(c.name, 0.0)) for c, large in linear if large)
-        beside = tuple(c for c in causes if c.probability >= SURE)
-        return Outcome("unexplained", beside, certain=frozenset(c.effect for c in beside))
+        within = (c for c in causes if c.probability >= SURE and not _is_bounded(c))
+        return Outcome("unexplained", tuple(replace(c, probability=min(c.probability, MOST)) for c in within))
 
     def failing(best: Candidate[Option]) -> tuple[str, ...]:
         chosen, noises = best.option.refit, [w.noise for w in found.posterior.weighings]
@@ -60,6 +63,12 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
     beyond = [found.arena.evidence.asked[found.arena.blocks[b].tag] for b in d.best.option.beyond] if d.best else []
     told = "would stand at its physical bound. Something else acts there."
     return d._replace(notes=(*d.notes, *(f"Not named: {name_of(h.effect.name, h.where)} {told}" for h in beyond)))
+
+
+def _is_bounded(cause: Cause) -> bool:
+    """Whether a value stands at its physical bound."""
+    bounds = {p.name: (p.low, p.high) for p in EFFECTS[cause.effect].parameters}
+    return any(e.value in bounds.get(n, ()) for n, e in cause.parameters.items())
 
 
 def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) -> Candidate[Option]:

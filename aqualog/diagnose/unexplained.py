@@ -22,7 +22,7 @@ from aqualog.diagnose.shapes import ALONG, Mechanism
 from aqualog.diagnose.unknown_term import ALIKE as SAME
 from aqualog.diagnose.unknown_term import describe
 
-__all__ = ["Clear", "clear_forms", "described", "unknown_forms"]
+__all__ = ["MOST", "Clear", "clear_forms", "described", "unknown_forms"]
 
 AHEAD = 3.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
 PART = 0.2  # of what the best set explains
@@ -121,7 +121,8 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
 
     Beside the conditions of `clear_forms`, a mechanism must explain 5 % of what the others leave of a channel, or of a
     difference between axles or sides. What it explains must be large. Half of that is enough for a smooth function that
-    surely reaches twice what a car and its simulation differ by anyway. And no effect of the library may stand for it:
+    surely reaches twice what a car and its simulation differ by anyway; one whose band holds zero, and a constant,
+    everywhere is no finding. And no effect of the library may stand for it:
     a load of a fifth of the car looks like a torque that goes with the torque.
     """
     whole = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
@@ -135,8 +136,9 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
         fit = fitted_in(arena.blocks, posterior.tolerant, members)
         size, share, channel = _where(arena, c.own, members, fit)
         form = described(arena, posterior, posterior.gram, fit, c, channel, share, seed)
-        is_sure = not form.manner and _surely(arena, fit, c.first, seed) >= WORTH * arena.mechanism(c.first).allowed
-        if size > (LITTLE if is_sure else 1.0) and share > WORTH_TELLING and form.cosine <= SAME:
+        sure = math.inf if form.manner else _surely(arena, fit, c.first, seed)
+        is_sure = not form.manner and sure >= WORTH * arena.mechanism(c.first).allowed
+        if sure > 0.0 and size > (LITTLE if is_sure else 1.0) and share > WORTH_TELLING and form.cosine <= SAME:
             found.append(form)
     return tuple(found)
 

@@ -129,5 +129,6 @@ def verdict_sentence(
             odds = "" if math.isnan(causes[0].probability) else f" (probability {causes[0].probability:.2f})"
             return f"The car may differ from the model, but this {source} does not make it certain: {names[0]}{odds}."
         return f"The car differs from the model, but this {source} cannot distinguish {listed(names)}."
-    known = f" beside {listed(names)}" if names else ""
+    likely = [f" (probability {c.probability:.2f})" if c.probability < SURE else "" for c in causes]
+    known = f" beside {listed([n + o for n, o in zip(names, likely, strict=True)])}" if names else ""
     return f"The car differs from the model{known} in a way that no effect of the library explains{reason}."

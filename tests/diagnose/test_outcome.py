@@ -12,6 +12,7 @@ from aqualog.diagnose.arena import arena_of
 from aqualog.diagnose.compete import compete
 from aqualog.diagnose.hypotheses import value_in
 from aqualog.diagnose.outcome import conclude
+from aqualog.diagnose.records import Cause, Estimate
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import Found, Option
 from aqualog.model.effects import EFFECTS
@@ -71,6 +72,21 @@ def test_one_set_of_one_is_named_with_its_interval_and_probability():
     assert (
         o.causes[0].sentence == "The car weighed 200 kg more than the vehicle file says; 95 % interval 156 to 244 kg."
     )
+
+
+def test_beside_an_unknown_form_nothing_is_certain_and_nothing_stands_at_a_bound(monkeypatch):
+    def cause(key, value):
+        p = EFFECTS[key].parameters[0]
+        return Cause(key, None, {p.name: Estimate(value, value, value, p.unit)}, (), key), True
+
+    causes = (cause("payload_mass", 200.0), cause("wheel_inertia", EFFECTS["wheel_inertia"].parameters[0].low))
+    monkeypatch.setattr(outcome, "_linear", lambda *_: causes)
+    found = Found(SimpleNamespace(), S, S, SimpleNamespace(), ARENA, replace(POSTERIOR, marginal={
+        "payload_mass": 1.0, "wheel_inertia": 1.0,
+    }), (SimpleNamespace(),), ())  # fmt: skip
+    o = conclude(found, Model())
+    assert (o.verdict, names(o), o.certain) == ("unexplained", ["payload_mass"], frozenset())
+    assert o.causes[0].probability == 0.75
 
 
 def test_an_interval_ends_at_the_physical_bound():

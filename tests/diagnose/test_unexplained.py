@@ -160,6 +160,14 @@ def test_a_hump_in_speed_is_a_force_over_speed(monkeypatch):
         assert len(unknown_forms(a, p, seed=1)) == count
 
 
+def test_a_function_whose_band_holds_zero_everywhere_is_no_finding(monkeypatch):
+    a = arena(1, lambda c: hump(c["v_x"]))
+    found = compete(a)
+    assert unknown_forms(a, found, seed=1)
+    monkeypatch.setattr(unexplained, "_band", lambda at, *_: np.full(len(at), 1e4))
+    assert not unknown_forms(a, found, seed=1)
+
+
 def test_a_known_effect_is_no_unknown_form():
     a = arena(3, aero_drag=0.4)
     p = compete(a)
