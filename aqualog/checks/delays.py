@@ -81,7 +81,8 @@ def _correlation(x: FloatArray, y: FloatArray, k: int) -> float:
 
 
 def _doubt(windows: Windows, name: str, others: Sequence[str], lag: float) -> Doubt:
-    than = " and ".join(_SAID[o].rpartition(" ")[0] for o in others)
+    than = ", ".join(_SAID[o].rpartition(" ")[0] for o in others)
+    than = " and ".join(than.rsplit(", ", 1))
     own = [n for s in ([name] if len(others) > 1 else [name, *others]) for n in _symbols(windows, s)]
     what = f"{_SAID[name]} {abs(lag):.1f} s {'after' if lag > 0.0 else 'before'} {than}"
     return Doubt("delay", tuple(own), what, _ADVICE, value=lag)

@@ -30,7 +30,7 @@ __all__ = ["diagnosis_report"]
 
 _LOOKS = {"no_effect": "", "named": "told", "compound": "told", "cannot_tell": "partial", "unexplained": "partial"}
 _DECADES = (-1.0, 2.0)  # range of the bars: limit over smallest size worth naming
-_FOUND_HERE = ("torque", "resistance", "offset")  # kinds of remarks whose causes a diagnosis finds better
+_FOUND_HERE = ("torque", "resistance", "offset", "delay")  # kinds of remarks whose causes a diagnosis finds better
 _BEFOREHAND = "from how the log was driven alone, with each effect at its reference size"
 _MOST_LIMITS, _MOST_CONFUSED, _MOST_CHANNELS = 6, 5, 3  # in the terminal
 
