@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from itertools import permutations
+from itertools import combinations
 
 import numpy as np
 
@@ -45,7 +45,8 @@ def delay_doubts(windows: Windows) -> Iterator[Doubt]:
     seen |= {"omega": np.gradient(windows.speed, step)} if windows.wheels else {}
     seen |= {"torque": np.sum(torques, axis=0) / (windows.vehicle.mass * windows.vehicle.arm("fl"))} if torques else {}
     moves = {n: changes(x, step) for n, x in seen.items()}
-    lags = {(o, n): _lag(moves[o], moves[n], step) for o, n in permutations(moves, 2)}
+    lags = {(o, n): _lag(moves[o], moves[n], step) for o, n in combinations(moves, 2)}
+    lags |= {(n, o): -x for (o, n), x in lags.items()}
     related = {n: {o: x for (o, late), x in lags.items() if late == n and math.isfinite(x)} for n in moves}
     most = max(map(len, related.values()), default=0)
     for name, own in related.items():

@@ -68,10 +68,12 @@ class Late:
 
 
 def found_late(drives: Sequence[Signals], vehicle: Vehicle, model: Model) -> Late:
-    """What comes late and is not in the model; of several drives all are doubts: each may have clocks of its own."""
+    """What comes late and is not in the model; of several drives all are doubts: each may have clocks of its own. So is
+    a delay beyond its physical bounds."""
     known = {t.place for t in model.terms if t.effect.name in _SHIFTS}
     doubts = [d for s in drives for d in delays_in(s, vehicle) if not known & _places(d)]
-    if len(drives) > 1 or any(len(_places(d)) > 1 for d in doubts):
+    least, most = DELAY.parameters[0].low, DELAY.parameters[0].high
+    if len(drives) > 1 or any(len(_places(d)) > 1 or not least <= d.value <= most for d in doubts):
         return Late((), tuple(doubts))
     return Late(tuple(_cause(next(iter(_places(d))), d.value) for d in doubts))
 

@@ -55,10 +55,6 @@ _SHARED = "The extended model has what all drives share, not what some have alon
 # least share of the promised gain that held-out drives keep, which is 0 for an effect of half the size: 58 right names
 # kept 0.13 to 1.8 of it, two wrong ones beside measured noise -0.3 and 0.0 (S)
 KEPT = 0.1
-BESIDE_A_DELAY = (
-    0.5  # of a probability, beside a signal that comes late unexplained: what the sets say is incomplete (K)
-)
-_SHIFTS = ("signal_delay", "clock_skew")
 SAME = 0.2  # of what a signal changes by from sample to sample, a difference that is rounding
 
 
@@ -102,7 +98,9 @@ def diagnose(
     late = found_late([s for _, s in drives], vehicle, with_known(given, vehicle))
     found = _diagnosed(drives, vehicle, given, holdout, options, tell, Late(doubts=late.doubts))
     left = late.beyond(found.causes)
-    return _diagnosed(drives, vehicle, given, holdout, options, tell, left) if left.causes else found
+    if found.verdict == "not_testable" or not left.causes:
+        return found
+    return _diagnosed(drives, vehicle, given, holdout, options, tell, left)
 
 
 def _diagnosed(

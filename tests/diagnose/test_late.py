@@ -13,8 +13,8 @@ from tests.diagnose.test_run import ask, few, told  # noqa: F401 - `few` is a fi
 from tests.diagnose.test_verdict import cause, verdict
 
 
-def late(*names, drop=()):
-    return found_late([signals(delayed(made(seed=1), names, 0.5), drop=drop)], CAR, Model())
+def late(*names, drop=(), seconds=0.5):
+    return found_late([signals(delayed(made(seed=1), names, seconds), drop=drop)], CAR, Model())
 
 
 def test_one_of_three_is_a_cause_of_its_own():
@@ -30,6 +30,12 @@ def test_one_of_three_is_a_cause_of_its_own():
     assert "signal_delay" in both.certain
     shifted = verdict([([cause("signal_delay", "a_x")], 0.0), ([], -40.0)])
     assert found.beside(shifted) == shifted
+
+
+def test_a_delay_beyond_its_bounds_is_a_doubt():
+    found = late("a_x", seconds=2.4)
+    assert not found.causes
+    assert found.doubts[0].value == pytest.approx(2.4, abs=0.1)
 
 
 def test_what_the_model_has_is_no_finding():
