@@ -121,9 +121,9 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
 
     Beside the conditions of `clear_forms`, a mechanism must explain 5 % of what the others leave of a channel, or of a
     difference between axles or sides. What it explains must be large. Half of that is enough for a smooth function that
-    surely reaches twice what a car and its simulation differ by anyway; one whose band holds zero everywhere,
-    and which may be constant, is no finding. And no effect of the library may stand for it: a load of a fifth of the car looks like a
-    torque that goes with the torque.
+    surely reaches twice what a car and its simulation differ by anyway; one whose band holds zero everywhere, and which
+    may be constant, is no finding. And no effect of the library may stand for it: a load of a fifth of the car looks
+    like a torque that goes with the torque.
     """
     whole = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
 
