@@ -26,6 +26,19 @@ def _file(text: str, *names: str, metavar: str = "FILE", default: Any = None) ->
     return _option(kind, default, *(names or ("-o", "--out")), help=text, metavar=metavar)
 
 
+def _page(text: str, *names: str) -> tuple[Any, Any]:
+    return _option(Path | None, None, *(names or ("-o", "--out")), help=text, metavar="FILE", callback=_as_page)
+
+
+def _as_page(path: Path | None) -> Path | None:
+    """Return the name of a page, with `.html` where it has no ending."""
+    if path is None or path.suffix.lower() in (".html", ".htm"):
+        return path
+    if path.suffix:
+        raise typer.BadParameter(f'{path}: "{path.suffix}" is no page; expected a name that ends in .html')
+    return path.with_name(f"{path.name}.html")
+
+
 def _flag(text: str, name: str) -> tuple[Any, Any]:
     return _option(bool, False, name, help=text)
 
@@ -173,13 +186,13 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     ),
     "wet": _flag("Fit how the tyres float, to passes over water.", "--wet"),
     "accept": _flag("Take the drives' values also where the vehicle file says something else.", "--accept"),
-    "page:calibration": _file("Page with tables and residuals (HTML).", "--page"),
+    "page:calibration": _page("Page with tables and residuals (HTML).", "--page"),
     "holdout": _option(
         list[str] | None, None, "--holdout", metavar="LOG",
         help="Drive on which the gain is measured and nothing is fitted; may be repeated.",
     ),
     "out:model": _file("Extended model: a file that --model takes."),
-    "page:diagnosis": _file("Page with the pictures before and after (HTML).", "--page"),
+    "page:diagnosis": _page("Page with the pictures before and after (HTML).", "--page"),
     "level": _option(
         float, 0.01, "--level", help="Share of drives without effect that may be given one.", min=1e-4, max=0.5
     ),
@@ -230,13 +243,13 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "coefficients": _file("Coefficients of the wet grip index (TOML), from your copy.", "--coefficients"),
     "limits": _file("Thresholds of the tests that differ from the defaults (TOML).", "--limits"),
     "out:test": _file("Folder for the document, sets and runs as CSV, and the page.", metavar="DIR"),
-    "page:test": _file("Page (HTML).", "--page"),
+    "page:test": _page("Page (HTML).", "--page"),
     "folder:watched": _argument(
         Path, "Folder in which logs arrive, also of the network, with the folders below it.", "FOLDER"
     ),
     "campaign:watched": _file("Campaign file; its runs name the logs to come.", "--campaign", metavar="CAMPAIGN.toml"),
     "kind": _option(str, "straight", "--test", help="straight, curve or braking.", metavar="NAME"),
-    "out:watch": _file("Page that renews itself (HTML); default beside the campaign file: NAME.watch.html."),
+    "out:watch": _page("Page that renews itself (HTML); default beside the campaign file: NAME.watch.html."),
     "once": _flag("Measure what is there, and end.", "--once"),
     "every": _option(float, 1.0, "--every", help="Seconds between two looks.", min=0.1, max=3600.0, metavar="S"),
     "rivals": _flag("Also the methods of the prior art.", "--rivals"),
@@ -254,7 +267,7 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
         help="Exit with 5 if this is not kept, such as 'joint_cusum.recall>=0.9'; may be repeated.",
     ),
     "junit": _file("Gates and drives as JUnit XML, for a build server.", "--junit"),
-    "out:page": _file("Page (HTML)."),
+    "out:page": _page("Page (HTML)."),
     # campaigns
     "folder": _argument(Path, "Folder with logs, in it or below it.", "FOLDER", shows_default=True),
     "out:campaign": _file("Campaign file to write.", default=Path("campaign.toml")),

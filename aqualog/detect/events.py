@@ -107,7 +107,7 @@ class _Builder:
 
     def finish(self) -> list[Event]:
         """Return the event that is open at the end of the drive."""
-        return self._close(self._offset)
+        return self._close(self._offset, cut=True)
 
     def _note_gaps(self, lacks: BoolArray) -> None:
         oldest = (self._offset if self._open is None else self._open.start) - REACH_S * 1e9 / self._dt_ns
@@ -122,7 +122,8 @@ class _Builder:
         spans = ((first * self._dt_ns / 1e9, end * self._dt_ns / 1e9) for first, end in reversed(self._gaps))
         return next((g for g in spans if g[0] < at_s < g[1]), (at_s, at_s))
 
-    def _close(self, end: int) -> list[Event]:
+    def _close(self, end: int, *, cut: bool = False) -> list[Event]:
+        """Return the open event; `cut`: by the end of the drive."""
         if self._open is None:
             return []
         opened, self._open = self._open, None
@@ -130,6 +131,8 @@ class _Builder:
         since, after = (opened.evidence.pop(name, 0.0) for name in (SINCE, AFTER))
         # a wheel may report a puddle when the car has left it: then the cause is over before the event begins
         cause_end = self._gap_s(max(end_s - after, 0.0))[0]
+        if cut and cause_end <= start_s:  # it has just begun: nothing shows that its cause is over
+            cause_end = end_s
         cause_start = self._gap_s(max(start_s - since, 0.0))[1]  # a cause is known only where there are data
         return [
             Event(

@@ -103,6 +103,14 @@ def test_convert_tells_of_the_radius_that_nobody_gave(tmp_path):
     assert "default car" not in named.stderr
 
 
+def test_a_page_has_the_name_of_a_page(tmp_path):
+    told = run("doctor", MF4, "-o", tmp_path / "page.txt")
+    assert told.exit_code == 2
+    assert '".txt" is no page; expected a name that ends in .html' in " ".join(told.stderr.split())
+    assert run("doctor", MF4, "-o", tmp_path / "page").exit_code == 0
+    assert [p.name for p in tmp_path.iterdir()] == ["page.html"]
+
+
 def test_convert_with_decimal_comma(tmp_path):
     path = tmp_path / "c.csv"
     assert run("convert", MF4, "-o", path, "--decimal-comma").exit_code == 0

@@ -66,6 +66,18 @@ def test_a_cause_may_be_over_before_its_event_begins():
     assert AFTER not in event.evidence
 
 
+def test_a_cause_that_the_end_of_a_drive_cuts_is_not_over():
+    """A warning of one sample at the end, which an event that ends by itself would outlast by half a second."""
+    bits, zero = np.zeros(100, dtype=bool), np.zeros(100)
+    bits[99:] = True
+    book = EventBook(10_000_000)
+    book.take(
+        Track("joint_criteria", None, None, "-", zero, 1.0, bits), {AFTER: ("last", zero + 0.5)}, lambda _: "partial"
+    )
+    (event,) = book.finish()
+    assert event.cause_s == (0.99, 1.0)
+
+
 def booked(bits, statistic, since, cuts=()):
     book, events = EventBook(10_000_000), []
     for part in np.split(np.arange(bits.size), cuts):

@@ -19,6 +19,13 @@ def told(effect, where, **estimates):
         ("payload_mass", None, "delta_mass", Estimate(200.0, 193.6, 207.9, "kg"), "95 % interval 194 to 208 kg."),
         ("payload_mass", None, "delta_mass", Estimate(-150.0, -157.0, -143.0, "kg"), "95 % interval 143 to 157 kg."),
         ("signal_delay", "v_x", "delay", Estimate(0.2, 0.196, 0.203, "s"), "95 % interval 0.196 to 0.203 s."),
+        (
+            "signal_delay",
+            "a_x",
+            "delay",
+            Estimate(-0.106, -0.11, -0.1, "s"),
+            "comes 0.106 s early (longitudinal); 95 % interval 0.100 to 0.110 s.",
+        ),
     ],
 )
 def test_an_interval_has_the_digits_that_tell_its_ends_apart(effect, where, name, estimate, ends):
