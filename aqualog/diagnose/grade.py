@@ -44,7 +44,7 @@ LAP_LEAST_M, LAP_SIGMAS, LAP_CORRELATION = 500.0, 4.5, 0.7
 ALIKE_M = 2000.0  # [m] over which the road's autocorrelation counts
 SPEED, GOES_WITH_ACCELERATION = 1, slice(3, None)  # of the shapes of `_motion`
 CLIPPED = 5.0  # robust standard deviations
-# [m/s^2] mean slope hidden by offsets of accelerometer (V, ESC) and of resistance: 4 m/s of wind at 25 m/s, cold tyres (K)
+# [m/s^2] mean slope hidden by an offset of the accelerometer (V, ESC), or by 4 m/s of wind and cold tyres (K)
 BIAS_SD, FORCE_SD = 0.1, 0.05
 
 
