@@ -31,8 +31,8 @@ def _page(text: str, *names: str) -> tuple[Any, Any]:
 
 
 def _as_page(path: Path | None) -> Path | None:
-    """Return the name of a page, with `.html` where it has no ending."""
-    if path is None or path.suffix.lower() in (".html", ".htm"):
+    """Return the name of a page, with `.html` where it has no ending; of a file that exists more is said later."""
+    if path is None or path.suffix.lower() in (".html", ".htm") or path.exists():
         return path
     if path.suffix:
         raise typer.BadParameter(f'{path}: "{path.suffix}" is no page; expected a name that ends in .html')

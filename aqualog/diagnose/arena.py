@@ -101,11 +101,11 @@ class Arena(Field):
         each = enumerate(weighings)
         return np.asarray(sum(self._inner(i, w.width, partial(w.rows, kind=np.float32)) for i, w in each))
 
-    def white(self) -> FloatArray:
-        """The same under white noise of the size of the residuals' steps."""
+    def white(self, *, whole: bool = False) -> FloatArray:
+        """The same under white noise of the size of the residuals' steps, or of the `whole` residuals."""
         total = np.zeros((self.sd.size + 1, self.sd.size + 1))
         for i, p in enumerate(self.parts):
-            noise = white_noise(p.residual, p.mask, contrasts(p.channels))
+            noise = white_noise(p.residual, p.mask, contrasts(p.channels), whole=whole)
             used = np.asarray((noise.weights > 0.0).any(axis=0))
 
             def white(x: FloatArray, rotation: FloatArray = noise.rotation, used: BoolArray = used) -> FloatArray:

@@ -57,6 +57,11 @@ class _Noise:
     likely: float
     bare: float
 
+    @property
+    def is_consistent(self) -> bool:
+        """Whether the set, which the noise was sought beside, is likelier there than none."""
+        return not self.members or self.likely >= self.bare
+
 
 @dataclass(frozen=True, slots=True)
 class Begun:
@@ -67,7 +72,7 @@ class Begun:
 
     arena: Arena
     columns: tuple[npt.NDArray[Any], ...]
-    whitely: FloatArray
+    whitely: tuple[FloatArray, ...]
     tried: dict[tuple[Members, bytes], _Noise]
 
     def after(self, members: Members, fit: Fitted | None, number: int = 0) -> _Noise:
@@ -98,19 +103,22 @@ def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -
         best = max(sets, key=lambda k: sets[k])
         coloured = [(m, fitted_in(arena.blocks, tolerant, m), number) for m in _first(arena, tolerant, best)]
         # a noise beside what is within the tolerances is no finding, and what else there is has to be seen beside it
-        bases = dict.fromkeys([best, noise.members])
-        each = (m for b in (*bases, ()) for m in _first(arena, begun.whitely, b))
-        others = dict.fromkeys(m for m in each if m or m == best)
-        white = [(m, fitted_in(arena.blocks, begun.whitely, m), 0) for m in others]
+        bases = (dict.fromkeys([best, noise.members, ()]), [noise.members])
+        white = []
+        for inner, own in zip(begun.whitely, bases, strict=True):
+            each = (m for b in own for m in _first(arena, inner, b))
+            white += [(m, fitted_in(arena.blocks, inner, m), 0) for m in dict.fromkeys(each) if m or m == best]
         tried = beside(lambda s: begun.after(*s), [*coloured, *white])
         # white noise is wrong: a second step is fairer
         likeliest = max(tried[len(coloured) :], key=lambda n: n.likely)
         tried += [begun.after(likeliest.members, likeliest.fit, number)]
-        better = max(tried, key=lambda n: n.likely)
-        bare = max(bare, *(n.bare for n in tried))
+        tried = [n for n in tried if n.is_consistent]
+        better = max(tried, key=lambda n: n.likely, default=noise)
+        bare = max([bare, *(n.bare for n in tried)])
         if better.likely <= noise.likely:
             break
-        noise = max(better, begun.after(better.members, better.fit, number), key=lambda n: n.likely)
+        again = begun.after(better.members, better.fit, number)
+        noise = again if again.is_consistent and again.likely > better.likely else better
         gram = arena.inner(noise.weighings)
     forms = any(b.kind == "shape" for b in arena.blocks)
     tolerant = arena.tolerant((COARSE_FORMS if forms else COARSE) * gram)
@@ -143,7 +151,7 @@ def begin(arena: Arena) -> Begun:
     values = np.zeros((int((w > NEGLIGIBLE).sum()), arena.sd.size))
     values[:, k] = (root @ V[:, w > NEGLIGIBLE]).T
     columns = tuple(arena.made(i, values).astype(np.float32) for i in range(len(arena.parts)))
-    return Begun(arena, columns, arena.tolerant(white), {})
+    return Begun(arena, columns, (arena.tolerant(white), arena.tolerant(arena.white(whole=True))), {})
 
 
 def _beside(begun: Begun, members: Members, fit: Fitted | None) -> _Noise:

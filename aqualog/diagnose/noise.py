@@ -111,9 +111,10 @@ def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> N
     return Noise(rotation, taps, shaping, root)
 
 
-def white_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> Noise:
-    """Noise without colour, of the size of the steps from sample to sample."""
-    steps = np.diff(contrasts @ bridged(residual, mask), axis=1) * np.sqrt(0.5)
+def white_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray, *, whole: bool = False) -> Noise:
+    """Noise without colour, of the size of the steps from sample to sample, or of the `whole` residual."""
+    x = contrasts @ bridged(residual, mask)
+    steps = x[:, mask] if whole else np.diff(x, axis=1) * np.sqrt(0.5)
     scale = np.maximum(1.4826 * np.median(np.abs(steps), axis=1), FLOOR)
     taps = np.zeros((len(scale), MEMORY + 1))
     taps[:, 0] = 1.0

@@ -121,8 +121,8 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
 
     Beside the conditions of `clear_forms`, a mechanism must explain 5 % of what the others leave of a channel, or of a
     difference between axles or sides. What it explains must be large. Half of that is enough for a smooth function that
-    surely reaches twice what a car and its simulation differ by anyway; one whose band holds zero everywhere, and which
-    may be constant, is no finding. And no effect of the library may stand for it: a load of a fifth of the car looks
+    surely reaches twice what a car and its simulation differ by anyway; one that may be smaller than that everywhere,
+    or constant, is no finding. And no effect of the library may stand for it: a load of a fifth of the car looks
     like a torque that goes with the torque.
     """
     whole = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
@@ -137,8 +137,10 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
         size, share, channel = _where(arena, c.own, members, fit)
         form = described(arena, posterior, posterior.gram, fit, c, channel, share, seed)
         sure = math.inf if form.manner else _surely(arena, fit, c.first, seed)
-        is_sure = not form.manner and sure >= WORTH * arena.mechanism(c.first).allowed
-        if sure > 0.0 and size > (LITTLE if is_sure else 1.0) and share > WORTH_TELLING and form.cosine <= SAME:
+        allowed = arena.mechanism(c.first).allowed
+        is_sure = not form.manner and sure >= WORTH * allowed
+        is_large = size > (LITTLE if is_sure else 1.0) and sure > allowed
+        if is_large and share > WORTH_TELLING and form.cosine <= SAME:
             found.append(form)
     return tuple(found)
 

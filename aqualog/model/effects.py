@@ -329,8 +329,7 @@ _ALL = [
         _on_channels(lambda c, v: replace(c, delay_s=c.delay_s + v["delay"])), _SIGNALS, "v_x", twins=("clock_skew",),
         drive=DriveSearch(
             places=("v_x", "a_x", "omega", "torque", "a_y", "yaw_rate"), tolerance=0.01, tolerance_at=_SIDE_SLIP,
-            is_shift=True, is_relative=True),
-        less="The signal comes {delay:.3f} s early.",
+            is_shift=True, is_relative=True), less="The signal comes {delay:.3f} s early.",
     ),
     Effect(
         "tone_ring", "wheel-speed pick-up [-]", "The tone ring of the wheel is uneven by {amplitude:.2%}.",

@@ -82,14 +82,14 @@ def test_a_history_is_no_source(folder, args):
 @pytest.mark.parametrize(
     "args",
     [
-        ("calibrate", "a.csv", "--vehicle", "car.toml", "-o", "x", "--page", "./x"),
-        ("evaluate", "campaign.toml", "--tune", "x", "-o", "x"),
+        ("calibrate", "a.csv", "--vehicle", "car.toml", "-o", "x.html", "--page", "./x.html"),
+        ("evaluate", "campaign.toml", "--tune", "x.html", "-o", "x.html"),
         ("detect", "a.csv", "-o", "out", "--write", "out/signals.parquet"),
     ],
 )
 def test_two_results_of_one_name(folder, args):
     refused(args, "named for two results")
-    assert not (folder / "x").exists()
+    assert not (folder / "x.html").exists()
     assert not (folder / "out").exists()
 
 
