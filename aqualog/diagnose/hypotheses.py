@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -40,7 +41,7 @@ MOST_LANES = 16  # that differ from each other; of more lanes, every 16th have a
 class Hypothesis:
     """One effect at one place. `free` parameters are sought, `fixed` ones have these values. `room`: tolerance in place
     of the effect's own, where the log shows the effect less well or the vehicle file knows it better. `drive`: name of
-    the only drive that has it, of several; empty: all of them."""
+    the only drive that has it, of several; empty: all of them. `most`: bound of the first parameter on this car."""
 
     effect: Effect
     where: str | None
@@ -48,6 +49,7 @@ class Hypothesis:
     fixed: Mapping[str, float] = field(default_factory=dict)
     room: float | None = None
     drive: str = ""
+    most: float = math.inf
 
     @property
     def allowed(self) -> bool:
@@ -84,7 +86,8 @@ class Hypothesis:
 
     def parameter(self, name: str) -> Parameter:
         """One of the effect's parameters."""
-        return next(p for p in self.effect.parameters if p.name == name)
+        p = next(p for p in self.effect.parameters if p.name == name)
+        return p if p.high <= self.most or name != self.free[0] else replace(p, high=self.most)
 
     def tolerance(self, name: str) -> float:
         """Standard deviation of a parameter that is not worth naming; 0 for events and for places whose parts are
@@ -143,7 +146,9 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             is_whole = where not in (*WHEELS, *AXLES) or effect.drive.is_single  # a load may sit at an axle
             alone = apart if effect.belongs == "drive" and is_whole else []
             variants = effect.drive.variants(length)
-            out += [Hypothesis(effect, where, free, fixed, room, n) for n in ("", *alone) for fixed in variants]
+            own = AXLES.get(where or "", WHEELS if where is None else (where,))
+            most = math.inf if set(own) <= {*drives[0].vehicle.driving} else effect.drive.most_free
+            out += [Hypothesis(effect, where, free, fixed, room, n, most) for n in ("", *alone) for fixed in variants]
     out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(() if torque else (STAND_IN,)))]
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
     # without torque there is no drag to test, nor one that differs

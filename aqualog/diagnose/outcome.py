@@ -22,7 +22,6 @@ from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unexplained import MOST
 from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, Causes, Outcome, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence, name_of
-from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 
 __all__ = ["conclude", "with_causes"]
@@ -66,9 +65,8 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
 
 
 def _is_bounded(cause: Cause) -> bool:
-    """Whether a value stands at its physical bound."""
-    bounds = {p.name: (p.low, p.high) for p in EFFECTS[cause.effect].parameters}
-    return any(e.value in bounds.get(n, ()) for n, e in cause.parameters.items())
+    """Whether a value stands at its physical bound, which its interval does not pass."""
+    return any(e.value in (e.low, e.high) for e in cause.parameters.values())
 
 
 def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) -> Candidate[Option]:

@@ -91,7 +91,7 @@ MECHANISMS: tuple[Mechanism, ...] = (
         _over("t", without="torque steer_angle yaw_rate water_depth since_braking"), is_fast=True, scales="a_x",
     ),
     Mechanism(
-        "torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.005,
+        "torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.01,
         _over("t", without="a_x steer_angle yaw_rate water_depth"), is_fast=True,
     ),
     Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.035, _SLIP, is_fast=True,

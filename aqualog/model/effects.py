@@ -291,7 +291,7 @@ _ALL = [
         _on_plant(lambda p, v, w: p._replace(
             inertia=np.maximum(_changed(p.inertia, w, np.add, v["delta_inertia"]), 0.05))),
         _WHEEL_PLACES, twins=("payload_mass",),
-        drive=DriveSearch((_TORQUE,), tolerance=0.15, axle_key="wheels.inertia_"),
+        drive=DriveSearch((_TORQUE,), tolerance=0.15, axle_key="wheels.inertia_", most_free=1.5),  # a second wheel (K)
     ),
     Effect(
         "accelerometer_bias", "accelerometer [m/s²]", "The accelerometer is off by {bias:+.2f} m/s².",
@@ -305,7 +305,7 @@ _ALL = [
         "accelerometer_gain", "accelerometer [-]", "The accelerometer reads {gain:.3f} times the truth.", "1-3 % (K)",
         (Parameter("gain", "-", 1.0, 0.02, 0.5, 1.5, 0.01, "on the true value"),),
         _on_channels(lambda c, v: replace(c, gain=c.gain * v["gain"])), ("a_x", "a_y"), "a_x",
-        drive=DriveSearch(places=_PAIR, tolerance_at={"a_y": 0.03}),
+        drive=DriveSearch(places=_PAIR, tolerance_at={"a_x": 0.012, "a_y": 0.03}),  # pitch of 0.07 degrees per m/s² (K)
     ),
     Effect(
         "accelerometer_drift", "accelerometer [m/s³]", "The accelerometer drifts by {drift:.1e} m/s² a second.",

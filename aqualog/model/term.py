@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -78,7 +79,8 @@ class DriveSearch:
     `turns`: the sign changes on the way back; `is_shift`: it moves signals in time; `is_relative`: at all its places
     together it changes nothing; `is_single`: it counts once per car, wherever it acts; `is_quick`: it acts within
     10 ms, so that only short steps show it; `divides`: it acts as one over its value, so a straight line overshoots.
-    `doubt`: share by which another law of the tyre may respond.
+    `doubt`: share by which another law of the tyre may respond. `most_free`: bound of the first parameter at wheels
+    that are not driven.
     """
 
     needs: tuple[Need, ...] = ()
@@ -100,6 +102,7 @@ class DriveSearch:
     is_single: bool = False
     is_quick: bool = False
     divides: bool = False
+    most_free: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
