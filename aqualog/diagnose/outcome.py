@@ -22,6 +22,7 @@ from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unexplained import MOST
 from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, Causes, Outcome, candidates, decided, whole
 from aqualog.diagnose.words import cause_sentence, name_of
+from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 
 __all__ = ["conclude", "with_causes"]
@@ -65,8 +66,10 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
 
 
 def _is_bounded(cause: Cause) -> bool:
-    """Whether a value stands at its physical bound, which its interval does not pass."""
-    return any(e.value in (e.low, e.high) for e in cause.parameters.values())
+    """Whether a value stands at its physical bound: of the effect, or of this car, which its interval does not pass."""
+    bounds = {p.name: (p.low, p.high) for p in EFFECTS[cause.effect].parameters}
+    every = cause.parameters.items()
+    return any(e.value in bounds.get(n, ()) or (e.low < e.high and e.value in (e.low, e.high)) for n, e in every)
 
 
 def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) -> Candidate[Option]:

@@ -29,9 +29,40 @@ def test_a_drift_beside_noise_that_does_not_drift_is_certain():
     assert most > 20.0
 
 
-@pytest.mark.parametrize(("walk", "size", "seed"), [(0.05, 5.0, 11), (0.1, 8.0, 8)])
+@pytest.mark.parametrize(("walk", "size", "seed"), [(0.05, 5.0, 11), (0.1, 0.0, 9)])
 def test_a_drift_that_may_as_well_be_noise_is_not_sure(walk, size, seed):
     """Beside the noise that is left without the drift it would be certain."""
     p, most = chance(drifting(walk, size, seed))
     assert 0.5 < p < 0.95
     assert 0.0 < most < 3.0
+
+
+def known_signatures():
+    return waves(N, len(ASKED), seed=99) / np.array([h.parameter(h.free[0]).sigma for h in ASKED])[:, None, None]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_channel_of_small_steps_does_not_hide_what_another_one_shows(seed):
+    """By steps from sample to sample the load is that of the second channel, which has a contradiction of its own."""
+    s, load = known_signatures(), AT["payload_mass"]
+    s[load, 1] *= 0.05
+    noise = np.random.default_rng(seed).standard_normal((2, N)) * [[1.0], [0.05]]
+    own = s[load] * ASKED[load].parameter("delta_mass").sigma
+    posterior = held(bench_of(noise + np.array([[2.0], [-4.0]]) * own, s))[1]
+    assert posterior.marginal["payload_mass"] > 0.95
+
+
+@pytest.mark.parametrize(("size", "low", "high"), [(4.0, 0.95, 1.0), (0.0, 0.0, 0.5)])
+@pytest.mark.parametrize("seed", [0, 4, 5])
+def test_an_offset_is_no_noise_that_only_a_drift_would_leave(seed, size, low, high):
+    """Beside hills of half of a unit; what the drift leaves is a ramp, whose noise has room for an offset."""
+    rng, s = np.random.default_rng(seed), known_signatures()
+    ramp = np.linspace(0.0, 1.0, N)
+    for key, row in (("road_grade", np.ones(N)), ("head_wind", 2.0 * ramp - 1.0), ("rolling_resistance", ramp**2)):
+        h = ASKED[AT[key]]
+        s[AT[key]] = np.stack([row, 0.0 * row]) / h.parameter(h.free[0]).sigma
+    window = np.hanning(301) / np.sqrt((np.hanning(301) ** 2).sum())
+    hills = np.convolve(rng.standard_normal(N + 300), window, "valid")
+    first = size + 0.5 * hills + 0.1 * rng.standard_normal(N)
+    posterior = held(bench_of(np.stack([first, rng.standard_normal(N)]), s))[1]
+    assert low <= posterior.marginal.get("road_grade", 0.0) <= high
