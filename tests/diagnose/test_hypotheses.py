@@ -43,6 +43,14 @@ def test_every_effect_is_asked_about_or_its_absence_has_a_reason(drive):
     assert {h.effect.name for h in asked if h.allowed} == {t.name for t in TOLERANCES}
 
 
+def test_a_wheel_that_is_not_driven_has_no_motor(drive):
+    high = {h.key: h.parameter(h.free[0]).high for h in hypotheses([drive], Model())[0]}
+    free, driven = ("f", "r") if drive.vehicle.drivetrain == "rwd" else ("r", "f")
+    own = [high[f"wheel_inertia@{free}{side}"] for side in ("", "l", "r") if f"wheel_inertia@{free}{side}" in high]
+    assert {*own, high["wheel_inertia"]} == {EFFECTS["wheel_inertia"].drive.most_free}
+    assert high[f"wheel_inertia@{driven}"] == EFFECTS["wheel_inertia"].parameters[0].high
+
+
 def test_what_has_no_signal_is_not_asked_about():
     d = prepare(changed(plain(), plain().frame.drop([f"torque_{w}" for w in WHEELS])), CAR, "a")
     asked, untested = hypotheses([d], Model())

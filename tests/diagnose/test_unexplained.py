@@ -166,6 +166,11 @@ def test_a_function_whose_band_holds_zero_everywhere_is_no_finding(monkeypatch):
     assert unknown_forms(a, found, seed=1)
     monkeypatch.setattr(unexplained, "_band", lambda at, *_: np.full(len(at), 1e4))
     assert not unknown_forms(a, found, seed=1)
+    # nor is one that is surely nowhere larger than what cars and simulations differ by anyway
+    allowed = next(m for m in MECHANISMS if m.name == "force").allowed
+    for share, count in ((0.9, 0), (1.1, 1)):
+        monkeypatch.setattr(unexplained, "_surely", lambda *_, x=share * allowed: x)
+        assert len(unknown_forms(a, found, seed=1)) == count
 
 
 def test_a_known_effect_is_no_unknown_form():
