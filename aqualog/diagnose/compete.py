@@ -66,8 +66,8 @@ class _Noise:
 @dataclass(frozen=True, slots=True)
 class Begun:
     """What stays the same in all rounds: what cars and files differ by anyway along each part, as few `columns`
-    (r, C, n) of independent unit values; `whitely`, inner products in the metric of white noise; noises that were tried
-    after sets there, or in the first round.
+    (r, C, n) of independent unit values; `whitely`, inner products in the metrics of white noise, of the size of
+    steps and of whole residuals; noises that were tried after sets there, or in the first round.
     """
 
     arena: Arena
@@ -88,9 +88,9 @@ def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -
     """The posterior over the sets that a search with swaps visits.
 
     The noise is that beside which the measurement is most likely, after one of the first candidates in the metrics of
-    coloured and of white noise, or after the best set so far. Else a slow effect would count as noise and could not be
-    found. The noise is sought with the whole likelihood, in at most so many rounds; the posterior has a share of it.
-    `begun`: of the same arena, where fewer rounds of it are known already.
+    coloured noise and of both white ones, or after the best set so far. Else a slow effect would count as noise and
+    could not be found. The noise is sought with the whole likelihood, in at most so many rounds; the posterior has a
+    share of it. `begun`: of the same arena, where fewer rounds of it are known already.
     """
     only = begun is None
     begun = begun or begin(arena)
