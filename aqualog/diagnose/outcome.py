@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from aqualog.core.intervals import Z95
+from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.competition import COARSE
@@ -91,7 +92,22 @@ def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) ->
     sharp = beside(sharper, near)
     best = min(s.sharp for s in sharp)
     as_good = [s for s in sharp if COARSE * (s.sharp - best) < 2.0 * math.log(PLACES)]
-    return max(as_good, key=lambda s: (whole(s), s.share))
+    picked = max(as_good, key=lambda s: (whole(s), s.share))
+    torn = (s for s in as_good if s.share > picked.share / PLACES and s.names == picked.names and _apart(s, picked))
+    return replace(picked, torn=tuple(torn))
+
+
+def _apart(a: Candidate[Option], b: Candidate[Option]) -> bool:
+    """Whether one effect is at wheels of its own in each of two sets."""
+    at = {(c.effect, c.drives): _wheels(c) for c in b.large}
+    each = ((_wheels(c), at.get((c.effect, c.drives))) for c in a.large)
+    return any(own and there and own.isdisjoint(there) for own, there in each)
+
+
+def _wheels(cause: Cause) -> frozenset[str]:
+    """Wheels at which a cause is; none where it is no matter of wheels."""
+    where = cause.where or ""
+    return frozenset(AXLES.get(where) or SIDES.get(where) or (where,)) & frozenset(WHEELS)
 
 
 def _refitted(found: Found, r: Refit) -> Causes:

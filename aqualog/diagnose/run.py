@@ -10,6 +10,7 @@ import numpy as np
 
 from aqualog.checks.follows import Follow, follow
 from aqualog.core.errors import ConfigError, SignalError
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
@@ -40,7 +41,7 @@ from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unknown_term import as_term, short_form
 from aqualog.diagnose.verdict import Outcome
-from aqualog.diagnose.words import term_words, verdict_sentence
+from aqualog.diagnose.words import listed, term_words, verdict_sentence
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 
@@ -55,6 +56,7 @@ _SHARED = "The extended model has what all drives share, not what some have alon
 # least share of the promised gain that held-out drives keep, which is 0 for an effect of half the size: 58 right names
 # kept 0.13 to 1.8 of it, two wrong ones beside measured noise -0.3 and 0.0 (S)
 KEPT = 0.1
+_MOVES = {"v_x": ("v_x",), "wheel speeds": [f"omega_{w}" for w in WHEELS], "a_x": ("a_x",)}
 SAME = 0.2  # of what a signal changes by from sample to sample, a difference that is rounding
 
 
@@ -407,7 +409,11 @@ def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> 
                 f"changes with those of the speed is {defect.correlation:.2f}, and their ratio is {defect.gain:.2f}"
             )
     used = sum(d.used_s for d in ready)
-    return f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed" if used < LEAST_USED_S else ""
+    if used >= LEAST_USED_S:
+        return ""
+    lacks = [n for n, signals in _MOVES.items() if not any(set(signals) & d.present for d in ready)]
+    hint = f"; the log has no {listed(lacks)}: name the channels in a map (--signals)" if lacks else ""
+    return f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed{hint}"
 
 
 def _not_testable(

@@ -15,6 +15,7 @@ __all__ = ["CREDIBLE", "PLACES", "Candidate", "Causes", "Outcome", "candidates",
 
 CREDIBLE = 20.0  # evidence ratio within which places of one effect cannot be distinguished
 PLACES = 5.0  # evidence ratio within which the whole car is preferred to a part of it
+DOUBTED = 0.9  # most probability of what fails a check, below that of a name
 WORTH_SAYING = 0.05  # probability of a set that is not named, from which a note tells of it
 LEAST_SHARE = 1e-4  # probability of a set, below which its values are not looked at
 
@@ -24,13 +25,17 @@ Causes = tuple[tuple[Cause, bool], ...]
 
 @dataclass(frozen=True, slots=True)
 class Candidate(Generic[Option]):
-    """A set's causes, whether each is worth naming, its log `evidence` and its `share` of the posterior."""
+    """A set's causes, whether each is worth naming, its log `evidence` and its `share` of the posterior.
+
+    `torn`: sets with the same effects at other wheels, between which and this one nothing decides.
+    """
 
     option: Option
     causes: Causes
     evidence: float
     share: float
     sharp: float = math.nan
+    torn: tuple[Candidate[Option], ...] = ()
 
     @property
     def large(self) -> tuple[Cause, ...]:
@@ -104,15 +109,21 @@ def decided(
     # the same effects at other places that explain the log as well, or nearly so
     near = [c for s in group if s.share * CREDIBLE > group[0].share for c in s.large]
     here = {(c.key, c.drives) for c in best.large}
+    own, torn = _torn(best, own, marginal)
+    here |= {(c.key, c.drives) for c in torn}
     elsewhere = [c.sentence for c in near if (c.key, c.drives) not in here]
     notes = _small(best) + tuple(dict.fromkeys(f"Equally possible: {s}" for s in elsewhere))
     failed = failing(best)
+    if failed:
+        own = tuple(replace(c, probability=min(c.probability, DOUBTED)) for c in own)
     unsure = frozenset(c.name for c in own if c.probability < SURE)
     if not unsure and not failed:
         certain = frozenset(c.effect for c in own)
         return Outcome("named" if len(own) == 1 else "compound", own, (), best, certain, (), notes)
     others, total = [], sum(s.share for s in group)
-    rivals, rest = [(best, total)], []
+    rivals, rest = [(best, total - sum(s.share for s in best.torn)), *((s, s.share) for s in best.torn)], []
+    if torn:
+        others.append(Alternative(torn, best.share / sum(s.share for s in best.torn)))
     for g in ranked[1:]:
         if total >= SURE:
             break
@@ -126,10 +137,26 @@ def decided(
     certain = frozenset(c.effect for c in own if not failed and c.name not in unsure)
     # the best set whole, one effect at two places too; of the others what it does not have
     more = {c.name: c for a in reversed(others) for c in a.causes if c.name not in best.names}
-    shown = sorted([*own, *more.values()], key=lambda c: c.effect not in certain)
+    shown = sorted([*own, *torn, *more.values()], key=lambda c: c.effect not in certain)
     notes += tuple(f"Not named: {reason}" for reason in failed)
     remain = tuple((s, q / total) for s, q in rivals)
     return Outcome("cannot_tell", tuple(shown), tuple(others), best, certain, remain, notes)
+
+
+def _torn(
+    best: Candidate[Option], own: tuple[Cause, ...], marginal: Mapping[tuple[str, Sequence[str]], float]
+) -> tuple[tuple[Cause, ...], tuple[Cause, ...]]:
+    """The causes of the best set, and those at other wheels that are as likely: they share the probability."""
+    places = {(c.key, c.drives) for c in own}
+    total = best.share + sum(s.share for s in best.torn)
+    there = [
+        replace(c, probability=c.probability * s.share / total)
+        for s in best.torn for c in _with_probability(s.large, marginal) if (c.key, c.drives) not in places
+    ]  # fmt: skip
+    names = {(c.effect, c.drives) for c in there}
+    share = best.share / total
+    here = (replace(c, probability=c.probability * share) if (c.effect, c.drives) in names else c for c in own)
+    return tuple(here), tuple(there)
 
 
 def _with_probability(

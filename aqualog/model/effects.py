@@ -191,7 +191,7 @@ _ALL = [
         "motorways to 3-4 % (V, DMRB [dmrb2020])",
         (Parameter("grade", "rad", 0.0, 0.02, -0.2, 0.2, 0.002, "slope angle, uphill positive"),), _road_grade,
         twins=("accelerometer_bias",),
-        drive=DriveSearch(("a_x or wheel torque",), turns=True), belongs="drive",
+        drive=DriveSearch(("a_x or wheel torque",), turns=True), belongs="drive", less="The road falls by {grade:.1%}.",
     ),
     Effect(
         "head_wind", "speed through the air [m/s]", "A head wind of {speed:.1f} m/s blew.", "±5 m/s (K)",
@@ -284,7 +284,7 @@ _ALL = [
         drive=DriveSearch((_TORQUE,), count=2, tolerance=0.0), belongs="drive",
     ),
     Effect(
-        "wheel_inertia", "inertia of the wheels [kg·m²]", "A wheel has {delta_inertia:+.2f} kg·m² more inertia.",
+        "wheel_inertia", "inertia of the wheels [kg·m²]", "The inertia per wheel is {delta_inertia:+.2f} kg·m² off.",
         "1.0-1.8 with the driveline (K)",
         (Parameter("delta_inertia", "kg*m^2", 0.0, 0.5, -0.9, 20.0, 0.1, "per wheel",
             DayToDay("inertia", _as_inertia)),),

@@ -165,7 +165,9 @@ def test_too_little_driving_is_not_testable(monkeypatch):
     monkeypatch.setattr(run, "not_calibrated", lambda *_: "Mass is a guess.")
     d = told(log=noisy(speed=((0.0, 15.0), (12.0, 15.0), (22.0, 1.0)), duration_s=40.0))
     assert d.verdict == "not_testable"
-    assert "s of usable driving, 20 s are needed" in d.sentence
+    assert d.sentence.endswith("s of usable driving, 20 s are needed.")
+    nameless = changed(plain(), plain().frame.drop(["v_x", *(f"omega_{w}" for w in ("fl", "fr", "rl", "rr"))]))
+    assert "the log has no v_x and wheel speeds" in diagnose([("a", nameless)], CAR).sentence
     assert d.caution == "Mass is a guess."
 
 

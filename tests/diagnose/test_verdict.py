@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from aqualog.diagnose.outcome import _apart
 from aqualog.diagnose.records import SURE, Cause, Estimate
-from aqualog.diagnose.verdict import candidates, decided
+from aqualog.diagnose.verdict import DOUBTED, candidates, decided
 
 
 def cause(name, where=None, *, large=True):
@@ -45,6 +46,26 @@ def test_the_same_names_at_other_places_count_together():
     assert found.notes == ("Equally possible: drag r.",)
 
 
+def test_wheels_between_which_nothing_decides_share_the_probability():
+    sets = [([cause("drag", "fl")], 0.0), ([cause("drag", "fr")], -0.7), ([cause("slope")], -15.0)]
+    made = candidates([(tuple(causes), evidence) for causes, evidence in sets], lambda causes: causes)
+    found = decided(made, lambda group: replace(group[0], torn=tuple(group[1:])), lambda best: ())
+    assert found.verdict == "cannot_tell"
+    assert [(c.key, round(c.probability, 2)) for c in found.causes] == [("drag@fl", 0.65), ("drag@fr", 0.32)]
+    assert [[c.key for c in a.causes] for a in found.alternatives] == [["drag@fr"]]
+    assert (found.certain, found.notes) == (frozenset(), ())
+    assert sum(q for _, q in found.rivals) == pytest.approx(1.0)
+
+
+def test_only_other_wheels_are_apart():
+    def at(where):
+        return candidates([((cause("drag", where),), 0.0)], lambda causes: causes)[0]
+
+    assert _apart(at("fl"), at("fr"))
+    assert _apart(at("f"), at("rl"))
+    assert not any(_apart(at(a), at(b)) for a, b in [("fl", "f"), ("fl", None), (None, "fl"), ("v_x", "a_x")])
+
+
 def test_another_signal_is_another_cause():
     found = verdict([([cause("delay", "v_x")], 0.0), ([cause("delay", "a_x")], -1.0), ([cause("slope")], -15.0)])
     assert found.verdict == "cannot_tell"
@@ -66,6 +87,7 @@ def test_a_cause_that_fails_its_check_is_not_named():
     found = verdict([([cause("drag")], 0.0), ([], -40.0)], failed=("it has no gain.",))
     assert found.verdict == "cannot_tell"
     assert found.certain == frozenset()
+    assert found.causes[0].probability == DOUBTED < SURE
     assert found.notes == ("Not named: it has no gain.",)
 
 
