@@ -132,7 +132,8 @@ def test_track_clearing_is_the_answer(cleared, monkeypatch):
     found = diagnose_campaign(cleared, options=Options(surrogates=19))
     (cause,) = found.causes
     assert cause.key == "track_clearing"
-    assert cause.probability >= 0.95
+    # a check that fails leaves less than a name has
+    assert cause.probability >= (0.95 if found.verdict == "named" else 0.9)
     size = cause.parameters["delta_film"]
     assert 6e-4 < size.value < 1.8e-3
     assert size.low < 1.2e-3 < size.high
