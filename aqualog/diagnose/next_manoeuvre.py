@@ -59,7 +59,7 @@ def next_manoeuvre(
     information. It is `sensor` if only a further signal would give a tenth of the missing information, and `none` if
     nothing does. `separates` has the pairs that it decides in 95 of 100 cases. The same for the same input.
     """
-    names = [frozenset(h.name for h in c.refit.members) for c in rivals]
+    names = [frozenset(h.key for h in c.refit.members) for c in rivals]
     if len(set(names)) < 2:
         return None
     group = np.array([[float(n == m) for m in dict.fromkeys(names)] for n in names])
@@ -117,7 +117,7 @@ def _recommended(case: Case, o: _Option, before: float, *, enough: bool) -> Mano
     members = [c.refit.members for c in case.rivals]
     pairs = [
         (i, j) for i, j in combinations(range(len(members)), 2)
-        if {h.name for h in members[i]} != {h.name for h in members[j]}
+        if {h.key for h in members[i]} != {h.key for h in members[j]}
     ]  # fmt: skip
     decided = [q for q in pairs if o.gives.pairs[q] >= SURE]
     rises = f"the probability of naming the right cause rises from {_percent(before)} to {_percent(after)}"

@@ -168,6 +168,14 @@ def test_the_same_fault_of_two_signals_is_worth_a_run():
     assert answer.after >= answer.before
 
 
+def test_one_fault_at_two_wheels_is_two_causes():
+    evidence, rivals, noises = case(
+        [log(model("tyre_radius", "fl", delta=0.002))], [["tyre_radius@fl"], ["tyre_radius@fr"]]
+    )
+    answer = next_manoeuvre(evidence, rivals, noises, Model())
+    assert answer.before == pytest.approx(max(c.probability for c in rivals), abs=1e-6)
+
+
 def test_runs_are_safe(wind):
     _, drive, _ = wind
     wet = replace(drive, course=replace(drive.course, lanes=(Lane(5.0, 10.0, depth_left=1e-3, depth_right=1e-3),)))
