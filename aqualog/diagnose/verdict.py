@@ -109,8 +109,9 @@ def decided(
     # the same effects at other places that explain the log as well, or nearly so
     near = [c for s in group if s.share * CREDIBLE > group[0].share for c in s.large]
     here = {(c.key, c.drives) for c in best.large}
-    own, torn = _torn(best, own, marginal)
-    here |= {(c.key, c.drives) for c in torn}
+    own, others = _torn(best, own, marginal)
+    torn = {c.key: c for a in others for c in a.causes if (c.key, c.drives) not in here}
+    here |= {(c.key, c.drives) for c in torn.values()}
     elsewhere = [c.sentence for c in near if (c.key, c.drives) not in here]
     notes = _small(best) + tuple(dict.fromkeys(f"Equally possible: {s}" for s in elsewhere))
     failed = failing(best)
@@ -120,10 +121,8 @@ def decided(
     if not unsure and not failed:
         certain = frozenset(c.effect for c in own)
         return Outcome("named" if len(own) == 1 else "compound", own, (), best, certain, (), notes)
-    others, total = [], sum(s.share for s in group)
+    total = sum(s.share for s in group)
     rivals, rest = [(best, total - sum(s.share for s in best.torn)), *((s, s.share) for s in best.torn)], []
-    if torn:
-        others.append(Alternative(torn, best.share / sum(s.share for s in best.torn)))
     for g in ranked[1:]:
         if total >= SURE:
             break
@@ -133,30 +132,35 @@ def decided(
     for g, picked in zip(rest, beside(pick, rest), strict=True):
         ratio = math.exp(min(max(group[0].evidence - g[0].evidence, 0.0), 700.0))
         rivals.append((picked, sum(s.share for s in g)))
-        others.append(Alternative(_with_probability(picked.large, marginal), ratio))
+        others += (Alternative(_with_probability(picked.large, marginal), ratio),)
     certain = frozenset(c.effect for c in own if not failed and c.name not in unsure)
     # the best set whole, one effect at two places too; of the others what it does not have
     more = {c.name: c for a in reversed(others) for c in a.causes if c.name not in best.names}
-    shown = sorted([*own, *torn, *more.values()], key=lambda c: c.effect not in certain)
+    shown = sorted([*own, *torn.values(), *more.values()], key=lambda c: c.effect not in certain)
     notes += tuple(f"Not named: {reason}" for reason in failed)
     remain = tuple((s, q / total) for s, q in rivals)
-    return Outcome("cannot_tell", tuple(shown), tuple(others), best, certain, remain, notes)
+    return Outcome("cannot_tell", tuple(shown), others, best, certain, remain, notes)
 
 
 def _torn(
     best: Candidate[Option], own: tuple[Cause, ...], marginal: Mapping[tuple[str, Sequence[str]], float]
-) -> tuple[tuple[Cause, ...], tuple[Cause, ...]]:
-    """The causes of the best set, and those at other wheels that are as likely: they share the probability."""
-    places = {(c.key, c.drives) for c in own}
-    total = best.share + sum(s.share for s in best.torn)
-    there = [
-        replace(c, probability=c.probability * s.share / total)
-        for s in best.torn for c in _with_probability(s.large, marginal) if (c.key, c.drives) not in places
-    ]  # fmt: skip
-    names = {(c.effect, c.drives) for c in there}
-    share = best.share / total
-    here = (replace(c, probability=c.probability * share) if (c.effect, c.drives) in names else c for c in own)
-    return tuple(here), tuple(there)
+) -> tuple[tuple[Cause, ...], tuple[Alternative, ...]]:
+    """The causes of the best set, and what other wheels make of it that are as likely: they share the probability."""
+    here, total = {(c.key, c.drives) for c in own}, best.share + sum(s.share for s in best.torn)
+    at: dict[frozenset[str], list[Candidate[Option]]] = {}
+    for s in best.torn:
+        at.setdefault(frozenset(c.key for c in s.large), []).append(s)
+    there, names = [], set()
+    for sets in at.values():
+        share, causes = sum(s.share for s in sets), []
+        for c in _with_probability(sets[0].large, marginal):
+            is_own = (c.key, c.drives) in here
+            causes.append(c if is_own else replace(c, probability=c.probability * share / total))
+            names |= set() if is_own else {(c.effect, c.drives)}
+        there.append(Alternative(tuple(causes), best.share / share))
+    left = best.share / total
+    kept = (replace(c, probability=c.probability * left) if (c.effect, c.drives) in names else c for c in own)
+    return tuple(kept), tuple(there)
 
 
 def _with_probability(

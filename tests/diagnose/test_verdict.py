@@ -47,7 +47,13 @@ def test_the_same_names_at_other_places_count_together():
 
 
 def test_wheels_between_which_nothing_decides_share_the_probability():
-    sets = [([cause("drag", "fl")], 0.0), ([cause("drag", "fr")], -0.7), ([cause("slope")], -15.0)]
+    fr = [cause("drag", "fr")]  # once alone, once beside what is too small
+    sets = [
+        ([cause("drag", "fl")], 0.0),
+        (fr, -1.4),
+        ([*fr, cause("gain", large=False)], -1.4),
+        ([cause("slope")], -15.0),
+    ]
     made = candidates([(tuple(causes), evidence) for causes, evidence in sets], lambda causes: causes)
     found = decided(made, lambda group: replace(group[0], torn=tuple(group[1:])), lambda best: ())
     assert found.verdict == "cannot_tell"
