@@ -412,7 +412,7 @@ def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> 
     if used >= LEAST_USED_S:
         return ""
     lacks = [n for n, signals in _MOVES.items() if not any(set(signals) & d.present for d in ready)]
-    hint = f"; the log has no {listed(lacks)}: name the channels in a map (--signals)" if lacks else ""
+    hint = f"; the log has no {listed(lacks, 'or')}: name the channels in a map (--signals)" if lacks else ""
     return f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed{hint}"
 
 

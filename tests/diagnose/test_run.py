@@ -167,7 +167,7 @@ def test_too_little_driving_is_not_testable(monkeypatch):
     assert d.verdict == "not_testable"
     assert d.sentence.endswith("s of usable driving, 20 s are needed.")
     nameless = changed(plain(), plain().frame.drop(["v_x", *(f"omega_{w}" for w in ("fl", "fr", "rl", "rr"))]))
-    assert "the log has no v_x and wheel speeds" in diagnose([("a", nameless)], CAR).sentence
+    assert "the log has no v_x or wheel speeds" in diagnose([("a", nameless)], CAR).sentence
     assert d.caution == "Mass is a guess."
 
 
