@@ -132,13 +132,14 @@ def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -
 
 
 def _first(arena: Arena, inner: FloatArray, best: Members) -> list[Members]:
-    """A set, and the set with each of the blocks that gain most beside it."""
+    """A set, the set without each of its blocks, and with each of those that gain most beside it."""
     along = [
         i for i, b in enumerate(arena.blocks) if b.kind == "shape" and set(arena.shapes[b.tag].coordinates) & set(ALONG)
     ]
     apart = [i for i, b in enumerate(arena.blocks) if b.kind == "effect" and arena.evidence.asked[b.tag].drive]
     firsts = first_of(arena.blocks, inner, lambda i: arena.name(i).split("@")[0], best, along, apart)
-    return [best, *((*best, m) for m in firsts)]
+    fewer = [tuple(m for m in best if m != out) for out in best if len(best) > 1]
+    return [best, *fewer, *((*best, m) for m in firsts)]
 
 
 def begin(arena: Arena) -> Begun:

@@ -53,14 +53,15 @@ class Profile:
     """A hilly road: slope angle `theta` [rad] over the knots `s` [m], (k,) each, uphill positive; its mean over the
     drive is left out, because a constant could also be the accelerometer's offset.
 
-    `rms` and `mean` [rad] with 95 % intervals; `shared`: correlation of the two channels over 150 m, NaN without
-    torque; `lap_m`: length after which the road repeats itself, None on one pass; `drive`: its name, of several.
+    `rms` and `mean` [rad] with 95 % intervals, no mean where something else has the constant; `shared`: correlation of
+    the two channels over 150 m, NaN without torque; `lap_m`: length after which the road repeats itself, None on one
+    pass; `drive`: its name, of several.
     """
 
     s: FloatArray
     theta: FloatArray
     rms: Estimate
-    mean: Estimate
+    mean: Estimate | None
     p_value: float
     shared: float
     lap_m: float | None
@@ -85,8 +86,11 @@ class Profile:
         elif not np.isfinite(self.shared):
             text += "; with one pass and no torque, place and time cannot be distinguished"
         where = f" In {self.drive}." if self.drive else ""
+        if self.mean is not None and not self.mean.low <= 0.0 <= self.mean.high:
+            does = "climbs" if self.mean.value > 0.0 else "falls"
+            where = f" On the whole it {does} by {abs(self.mean.value):.1%}.{where}"
         text += f"; 95 % interval {self.rms.low:.1%} to {self.rms.high:.1%}.{where}"
-        values = {"grade_rms": self.rms, "grade_mean": self.mean}
+        values = {"grade_rms": self.rms} | ({} if self.mean is None else {"grade_mean": self.mean})
         drives = (self.drive,) if self.drive else ()
         return Cause("road_grade", None, values, ("kinematic",), text, self.probability, drives)
 

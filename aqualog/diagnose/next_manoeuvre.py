@@ -123,10 +123,9 @@ def _recommended(case: Case, o: _Option, before: float, *, enough: bool) -> Mano
     rises = f"the probability of naming the right cause rises from {_percent(before)} to {_percent(after)}"
     how = f"{o.what.how}{OFTEN[o.times]} ({o.minutes:.0f} min)"
     if not enough:
-        text = (
-            f"No run, check or further sensor distinguishes: {_told(members, pairs)}. The best is "
-            f"{o.what.name.replace('_', ' ')}{OFTEN[o.times]}: {rises}."
-        )
+        text = f"No run, check or further sensor distinguishes: {_told(members, pairs)}."
+        if _percent(after) != _percent(before):
+            text += f" The best is {o.what.name.replace('_', ' ')}{OFTEN[o.times]}: {rises}."
         return Manoeuvre("none", (), text, np.nan, np.nan, 0.0, before, after)
     text = f"{how}: {rises}."
     if o.sensor is not None:
@@ -156,7 +155,7 @@ def _keys(members: Sequence[Hypothesis]) -> str:
 def _told(members: Sequence[Sequence[Hypothesis]], pairs: Sequence[tuple[int, int]]) -> str:
     sides = [sorted(_apart(members, q), key=len, reverse=True) for q in pairs]
     words = list(dict.fromkeys(
-        " from ".join(" with ".join(name_of(h.effect.name, h.where) for h in s) or "its absence" for s in both)
+        " from ".join(" with ".join(name_of(h.effect.name, h.where) for h in s) or "no effect" for s in both)
         for both in sides
     ))  # fmt: skip
     more = len(words) - MENTIONED

@@ -135,12 +135,15 @@ def likeliest(evidence: Evidence, measure: Metric, residuals: Sequence[FloatArra
 
     All tolerances deviate together, theta = (S^-2 + A'A)^-1 A'y, each up to `FARTHEST`. Those of a drive or a lane are
     left out of the model: another drive has other ones. So is the build-up of tyre forces, with which a simulated wheel
-    may swing at low speed. A term that the model has keeps its values. `measure`: with all tolerances in full.
+    may swing at low speed. Less friction stands for a curve that bends early, but would let the wheels spin, and is
+    left out, too. A term that the model has keeps its values. `measure`: with all tolerances in full.
     """
     k = np.flatnonzero(evidence.forgiven > 0.0)
     theta = np.zeros(evidence.count)
+    owner = {c: h for h, columns in zip(evidence.asked, evidence.columns, strict=True) for c in columns}
     likely = measure.M @ measure.across(measure.rows([r[None] for r in residuals]))[0]
-    theta[k] = evidence.forgiven[k] * np.clip(likely, -FARTHEST, FARTHEST)
+    least = [0.0 if owner[c].effect.name == "friction" else -FARTHEST for c in k.tolist()]
+    theta[k] = evidence.forgiven[k] * np.clip(likely, least, FARTHEST)
     own, has = [], {(t.effect.name, t.place) for t in model.terms}
     for h, columns in zip(evidence.asked, evidence.columns, strict=True):
         stays = h.lane is None and h.effect.belongs in ("car", "tyre") and not h.effect.drive.is_quick

@@ -131,7 +131,8 @@ def _diagnosed(
     named = {c.key for c in outcome.causes}
     quiet = evidence.residuals if chosen is None else chosen.residuals
     noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, ready, strict=True)]
-    named_too = _extended(outcome, chosen, (), shifted, evidence.asked)
+    sloped = outcome._replace(causes=tuple(c for c in outcome.causes if c.effect != "road_grade"))
+    named_too = _extended(sloped, chosen, (), shifted, evidence.asked)
     for d in (d for d in ready if d.name in roads):
         outcome = _with_road(outcome, _road(d, named_too, roads[d.name].drive) or roads[d.name])
     outcome = late.beside(outcome)
@@ -225,8 +226,7 @@ def _agreed(outcome: Outcome[Option], agreed: Sequence[Agreement]) -> Outcome[Op
     outcome = outcome._replace(causes=tuple(widened(c, agreed) for c in outcome.causes))
     if outcome.verdict not in ("named", "compound") or not contradicted(outcome.causes, agreed):
         return outcome
-    why = "Not named: the drives contradict each other, see drive by drive."
-    return outcome._replace(verdict="cannot_tell", certain=frozenset(), notes=(*outcome.notes, why))
+    return outcome.doubted("the drives contradict each other, see drive by drive.")
 
 
 def _with_slow_force(found: Found, outcome: Outcome[Option], model: Model) -> tuple[Found, Outcome[Option]]:
@@ -296,8 +296,8 @@ def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str
     if not stays or outcome.verdict not in ("named", "compound"):
         return outcome
     whose = "the diagnosed drives" if gained.in_sample else "held-out drives"
-    note = f"Not named: {whose} are not predicted better with it, or by much less than it promises."
-    return outcome._replace(verdict="cannot_tell", certain=rings, notes=(*outcome.notes, note))
+    why = f"{whose} are not predicted better with it, or by much less than it promises."
+    return outcome.doubted(why, certain=rings)
 
 
 def _led(drive: Drive, model: Model) -> FloatArray:
@@ -325,7 +325,7 @@ def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
     is_sure = outcome.verdict != "cannot_tell" or "accelerometer_bias" in outcome.certain
     # an offset of the accelerometer has the constant that a mean would repeat
     if is_sure and any(c.key == "accelerometer_bias@a_x" for c in outcome.causes):
-        cause = replace(cause, parameters={n: e for n, e in cause.parameters.items() if n != "grade_mean"})
+        cause = replace(road, mean=None).cause
     return outcome.beside(cause)
 
 

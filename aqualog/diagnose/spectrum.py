@@ -24,6 +24,7 @@ BANDWIDTH = 0.3  # of the frequency: share that spectra are averaged over to eit
 NARROWEST, WIDEST = 10, 40  # bins to either side
 SLOPED = 60  # lines whose power may follow a power law
 FASTEST_HZ, BLOCK_S = 1.5, 0.1  # half of the log-likelihood counts there: cars pitch at 1 to 2 Hz (K); samples' step
+LAST_HZ = 3.0  # of the lines beyond, of which less than 6 % would count, there are two in five
 CHUNK, TILE = 6, 256  # columns, and their lines, that are transformed together and stay in the processor's memory
 
 
@@ -62,6 +63,7 @@ class Weighing:
             own = x[i : i + CHUNK]
             flat = whitened(bridged(own, self.mask), self.noise).reshape(own.shape)
             lines = np.fft.rfft(flat if self.used.all() else flat[..., self.used], self.size)
+            lines = lines[..., : self.inverse.shape[3]]
             _unrelated(lines, self.inverse, out[i : i + CHUNK].reshape(len(own), 2, *lines.shape[1:]))
 
         beside(fill, range(0, len(x), CHUNK))
@@ -107,18 +109,19 @@ def weighing(residuals: Sequence[FloatArray] | FloatArray, mask: BoolArray, cont
     cross = _averaged(np.einsum("dfi,dfj->fij", flat, flat.conj()) / len(flat))
     cross = np.concatenate([cross[:1].real.astype(complex), cross])
     cross += 1e-6 * np.trace(cross, axis1=1, axis2=2).real[:, None, None] * np.eye(raw.shape[-1])
-    root = np.linalg.cholesky(cross) * pilot[:, :, None]
-    # the share of the log-likelihood that counts: a simulator without suspension, driveline and the tyres' own motion
-    # says little of a car's fast movements
-    counts = 1.0 / (1.0 + (np.arange(raw.shape[1]) / size / (FASTEST_HZ * BLOCK_S)) ** 4)
     lines = np.full(raw.shape[1], 2.0)
     lines[0] = 1.0
-    scale = np.where((np.arange(len(lines)) == 0) | (2 * np.arange(len(lines)) == size), 1.0, 2.0) / size
+    last = int(size * LAST_HZ * BLOCK_S) + 1
+    root = np.linalg.cholesky(cross[:last]) * pilot[:last, :, None]
+    # the share of the log-likelihood that counts: a simulator without suspension, driveline and the tyres' own motion
+    # says little of a car's fast movements
+    counts = 1.0 / (1.0 + (np.arange(last) / size / (FASTEST_HZ * BLOCK_S)) ** 4)
+    scale = lines[:last] / size
     inverse = np.sqrt(counts * scale) * np.linalg.inv(root).transpose(1, 2, 0)
     logdet = 2.0 * np.log(np.abs(np.diagonal(root, axis1=1, axis2=2))).sum(axis=1)
-    logdet -= 2.0 * np.log(np.abs(np.fft.rfft(noise.taps, size)) + 1e-12).sum(axis=0)
-    share = float(lines @ counts / lines.sum())
-    sharpness = share * noise.sharpness + 0.5 * count / size * float((lines * counts) @ logdet)
+    logdet -= 2.0 * np.log(np.abs(np.fft.rfft(noise.taps, size)[:, :last]) + 1e-12).sum(axis=0)
+    share = float(lines[:last] @ counts / lines.sum())
+    sharpness = share * noise.sharpness + 0.5 * count / size * float((lines[:last] * counts) @ logdet)
     return Weighing(noise, mask, used, np.array([inverse.real, inverse.imag]), size, sharpness)
 
 

@@ -63,6 +63,14 @@ class Outcome(NamedTuple, Generic[Option]):
     rivals: tuple[tuple[Candidate[Option], float], ...] = ()
     notes: tuple[str, ...] = ()
 
+    def doubted(self, why: str, *, certain: frozenset[str] = frozenset()) -> Outcome[Option]:
+        """The outcome without a name, because of what a note says; `certain`: effects that stay so."""
+        causes = tuple(
+            c if c.effect in certain else replace(c, probability=min(c.probability, DOUBTED)) for c in self.causes
+        )
+        notes = (*self.notes, f"Not named: {why}")
+        return self._replace(verdict="cannot_tell", causes=causes, certain=certain, notes=notes)
+
     def beside(self, *sure: Cause) -> Outcome[Option]:
         """The outcome with causes that are certain, whatever its own are."""
         verdict, causes = self.verdict, (*self.causes, *sure)

@@ -123,8 +123,6 @@ def verdict_sentence(
         if sure and open_ones:
             others = listed(open_ones, "or")
             return f"Certain: {listed(sure)}. This {source} cannot distinguish the other causes: {others}."
-        if len(causes) == 1 and not sure and causes[0].probability >= SURE:
-            return f"The car may differ from the model: {names[0]} explains this {source} best, but fails a check."
         if len(causes) == 1 and not sure:
             odds = "" if math.isnan(causes[0].probability) else f" (probability {causes[0].probability:.2f})"
             return f"The car may differ from the model, but this {source} does not make it certain: {names[0]}{odds}."

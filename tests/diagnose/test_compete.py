@@ -1,9 +1,13 @@
 """What is slow beside noise that is slow, too."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 
-from tests.diagnose.test_subsets import ASKED, AT, bench_of, held, waves
+from aqualog.diagnose.arena import arena_of
+from aqualog.diagnose.compete import begin, compete
+from tests.diagnose.test_subsets import ASKED, AT, bench_of, held, made, waves
 
 N = 1500
 
@@ -66,3 +70,13 @@ def test_an_offset_is_no_noise_that_only_a_drift_would_leave(seed, size, low, hi
     first = size + 0.5 * hills + 0.1 * rng.standard_normal(N)
     posterior = held(bench_of(np.stack([first, rng.standard_normal(N)]), s))[1]
     assert low <= posterior.marginal.get("road_grade", 0.0) <= high
+
+
+def test_a_noise_is_sought_beside_the_best_set_without_each_of_its_effects():
+    """One of them may only stand for noise, beside which none of the set would be likelier than noise alone."""
+    arena = arena_of(made(road_grade=3.0, torque_gain=3.0, payload_mass=3.0), ())
+    begun = begin(arena)
+    best = compete(arena, begun=begun).best
+    tried = {members for members, _ in begun.tried}
+    assert len(best) == 3
+    assert set(combinations(best, 2)) <= {tuple(sorted(m)) for m in tried}

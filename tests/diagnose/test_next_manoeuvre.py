@@ -1,6 +1,7 @@
 """The run that tells causes apart: its expected information, and that it does when it is driven."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.drive import led_by, prepare
 from aqualog.diagnose.hypotheses import hypotheses, residual
 from aqualog.diagnose.manoeuvres import KMH, RUNS, programme, turned
-from aqualog.diagnose.next_manoeuvre import next_manoeuvre
+from aqualog.diagnose.next_manoeuvre import _recommended, next_manoeuvre
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.refit import metric, refit
 from aqualog.diagnose.run_information import Rival
@@ -200,3 +201,16 @@ def test_the_way_back_turns_wind_and_slope_and_nothing_else():
     back = turned(there)
     assert [dict(t.values) for t in back.terms] == [{"speed": -4.0}, {"grade": -0.01}, {"delta_mass": 50.0}]
     assert turned(back) == there
+
+
+@pytest.mark.parametrize(("after", "best"), [(0.603, ""), (0.7, " The best is speed steps, three times: ")])
+def test_a_run_that_decides_nothing_is_not_recommended(after, best):
+    radius = SimpleNamespace(key="tyre_radius@fl", effect=EFFECTS["tyre_radius"], where="fl")
+    rivals = [SimpleNamespace(refit=SimpleNamespace(members=own)) for own in ([radius], [])]
+    what = SimpleNamespace(name="speed_steps", how="Drive steps")
+    gives = SimpleNamespace(right=after, pairs={(0, 1): after})
+    option = SimpleNamespace(what=what, times=3, sensor=None, gives=gives, minutes=9.0)
+    said = _recommended(SimpleNamespace(rivals=rivals), option, 0.6, enough=False).sentence
+    start = "No run, check or further sensor distinguishes: tyre radius (front left wheel) from no effect."
+    assert said.startswith(start + best)
+    assert bool(best) == (len(said) > len(start))

@@ -228,8 +228,9 @@ def test_what_is_certain_is_not_called_open():
     assert said == "Certain: road grade. This log cannot distinguish the other causes: road grade (mean) or aero drag."
     both = verdict_sentence("cannot_tell", causes[1:], level=0.01)
     assert both == "The car differs from the model, but this log cannot distinguish aero drag and head wind."
-    one = verdict_sentence("cannot_tell", [replace(causes[0], probability=0.998)], level=0.01)
-    assert one == "The car may differ from the model: payload mass explains this log best, but fails a check."
+    one = verdict_sentence("cannot_tell", [replace(causes[0], probability=0.9)], level=0.01)
+    why = "this log does not make it certain: payload mass (probability 0.90)"
+    assert one == f"The car may differ from the model, but {why}."
 
 
 def test_a_slope_of_the_tyre_is_known_as_well_as_the_form_of_its_curve():

@@ -181,6 +181,17 @@ def test_the_cars_own_values_are_likeliest_within_the_tolerance_and_a_known_term
     assert kept.values["delta"] == 0.05
 
 
+def test_a_curve_that_bends_early_is_not_taken_for_less_friction():
+    """A model without the grip that the drive has would let its wheels spin."""
+    friction = next(Hypothesis(e, None, ("by",)) for e in TOLERANCES if e.name == "friction")
+    found = {}
+    for by in (-0.5, 0.5):
+        evidence, _, measure = prepared([friction, one("head_wind")], Term(friction.effect, {"by": by}))
+        found[by] = likeliest(evidence, measure, evidence.residuals, Model()).terms
+    assert found[-0.5] == ()
+    assert found[0.5][0].values["by"] > 0.1
+
+
 def test_a_car_drives_at_two_deviations_of_every_tolerance():
     d = prepare(signals(drop=("tie_rod_fl", "tie_rod_fr")), CAR, "a")
     for e in TOLERANCES:

@@ -302,6 +302,7 @@ def test_no_name_where_the_drive_itself_is_predicted_worse(monkeypatch):
     monkeypatch.setattr(run, "_at_likeliest", lambda f, e, bare, more: (bare, worse, list(e.residuals)))
     d = told(term("payload_mass", delta_mass=250.0))
     assert (d.verdict, d.gain.in_sample) == ("cannot_tell", True)
+    assert d.causes[0].probability == 0.9
     assert any("the diagnosed drives are not predicted better" in n for n in d.notes)
 
 
@@ -312,6 +313,19 @@ def test_a_force_with_a_name_is_no_slope_of_the_road(monkeypatch):
     assert keys(d) == {"brake_drag@f", "road_grade"}
     mean, (_, road) = d.causes[1].parameters["grade_mean"], clean_rows(hilly, world_of(hilly))
     assert mean.low < road.grid[:, 1].mean() < mean.high
+
+
+def test_a_road_that_falls_on_the_whole_has_its_mean(monkeypatch):
+    """Its constant slope is a cause as well, and part of the same road."""
+    ask(monkeypatch, ("road_grade",))
+    hilly = Spec("hilly", "gusts", (Hidden("road_grade", None, {"grade": -0.03}),), 8, "compact_fwd", holdout=0)
+    d = diagnose(make_case(hilly).drives, CARS["compact_fwd"], options=QUICK)
+    _, road = clean_rows(hilly, world_of(hilly))
+    e = d.causes[0].parameters["grade_mean"]
+    assert keys(d) == {"road_grade"}
+    assert road.grid[:, 1].mean() < -0.02
+    assert d.sentence.endswith(f" On the whole it falls by {-e.value:.1%}.")
+    assert e.low < road.grid[:, 1].mean() < e.high
 
 
 def test_the_torque_is_judged_without_an_accelerometer(monkeypatch):
