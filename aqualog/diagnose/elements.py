@@ -19,6 +19,7 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.arena import SHAPE_PRIOR, Arena
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.competition import Block
+from aqualog.diagnose.evidence import FARTHEST
 from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.shapes import MECHANISMS, Mechanism, Shape
 from aqualog.diagnose.spline import POINTS, Basis
@@ -54,7 +55,8 @@ def with_elements(arena: Arena) -> Arena:
         return arena
     part = arena.parts[0]
     used = part.mask
-    deviations = arena.tolerance @ arena.tolerant(arena.white())[:-1, -1]
+    most = FARTHEST * np.sqrt(np.diag(arena.tolerance))  # what a fault makes of them is no deviation
+    deviations = np.clip(arena.tolerance @ arena.tolerant(arena.white())[:-1, -1], -most, most)
     white = white_noise(part.residual, used, contrasts(part.channels)).rotation
     left = clipped(white @ (part.residual - arena.made(0, deviations[None])[0]), used)
     drive = arena.evidence.drives[part.drive]

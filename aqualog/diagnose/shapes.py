@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.notation import WHEELS
 from aqualog.diagnose.spline import Basis, basis
+from aqualog.diagnose.words import PLACES
 from aqualog.model.effects import EFFECTS
 
 __all__ = ["ALONG", "MECHANISMS", "Mechanism", "Shape", "shapes"]
@@ -104,6 +106,11 @@ MECHANISMS: tuple[Mechanism, ...] = (
     ),
     Mechanism("radius_f", "the radius of the front wheels", "tyre_radius@f", "-", 0.005, 0.00035, _RADIUS),
     Mechanism("radius_r", "the radius of the rear wheels", "tyre_radius@r", "-", 0.005, 0.00035, _RADIUS),
+    *(
+        Mechanism(f"radius_{w}", f"the radius of the {PLACES[w]}", f"tyre_radius@{w}", "-", 0.01, 0.0005,
+                  (("v_x",), ("t",)), family="radius")
+        for w in WHEELS
+    ),
     Mechanism(
         "velocity", "the scale of the reference velocity", "velocity_scale@v_x", "-", 0.01, 0.0005,
         _over("position", "t", without="torque steer_angle yaw_rate since_braking water_depth"),

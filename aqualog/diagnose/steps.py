@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
 
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import block_step, contrasts
@@ -18,14 +19,17 @@ __all__ = ["EDGES", "against", "begun", "clipped", "gain_of", "intervals", "mome
 
 EDGES = 75  # of intervals, evenly over the drive
 OUTLIER = 6.0  # of the median size (4 standard deviations), beyond which a sample counts no more
+LASTS = 10  # [samples] to either side, of whose median it may be an outlier
 SHORTEST = 3  # edges from the begin of an interval to its end
 SHORTEST_S = 1.0  # of a change that begins; a faster one looks the same in blocks of 0.1 s
 INTERVALS, PART = 5, 0.1  # the most intervals of a form, each with this share of what the one before explains (K)
 
 
 def clipped(left: FloatArray, used: BoolArray) -> FloatArray:
-    """What is left in white noise (C, n), without outliers: a kerb or a shift of a second is no form."""
+    """What is left in white noise (C, n), without outliers: a kerb or a shift of a second is no form, what lasts is."""
     most = OUTLIER * np.median(np.abs(left[:, used]), axis=1, keepdims=True)
+    near = np.pad(left, [(0, 0), (LASTS, LASTS)], mode="edge")
+    most = most + np.abs(np.median(sliding_window_view(near, 2 * LASTS + 1, axis=1), axis=-1))
     return np.asarray(np.clip(left, -most, most))
 
 
@@ -54,7 +58,7 @@ def intervals(weight: FloatArray, score: FloatArray) -> list[tuple[int, int, int
     """
     n = weight.size
     at = np.linspace(0, n, EDGES + 1).astype(np.intp)
-    i, j = np.triu_indices(EDGES + 1, SHORTEST)
+    i, j = np.triu_indices(EDGES + 1, 1)
     usable = i + EDGES - j >= SHORTEST
     i, j = at[i[usable]], at[j[usable]]
     A = np.concatenate([[0.0], np.cumsum(weight)])
@@ -88,7 +92,7 @@ def _moved(
     right = X @ score
     known = float(right @ inverse @ right - right[0] ** 2 / weight.sum())
     inside = (low > 0, high < n)
-    shortest = min(SHORTEST * step, high - low)
+    shortest = min(step, high - low)
     while step >= 1:
         moves = [(d * inside[0], e * inside[1], r) for d in (-step, 0, step) for e in (-step, 0, step)
                  for r in (-step, 0, step)]  # fmt: skip

@@ -11,10 +11,10 @@ from aqualog.core.units import displayed_unit
 from aqualog.diagnose.records import SURE, Cause, Estimate
 from aqualog.model.term import Effect, Term
 
-__all__ = ["cause_sentence", "listed", "name_of", "place", "quantity", "term_words", "verdict_sentence"]
+__all__ = ["PLACES", "cause_sentence", "listed", "name_of", "place", "quantity", "term_words", "verdict_sentence"]
 
 MANY_UNTESTED = 5  # more than those of water, which no dry road shows
-_PLACES = {
+PLACES = {
     "fl": "front left wheel", "fr": "front right wheel", "rl": "rear left wheel", "rr": "rear right wheel",
     "f": "front axle", "r": "rear axle", "left": "left side", "right": "right side",
     "a_x": "longitudinal", "a_y": "lateral", "v_x": "reference velocity",
@@ -24,7 +24,7 @@ _PLACES = {
 
 def place(where: str | None) -> str:
     """` (front left wheel)`, or an empty string for the whole car."""
-    return "" if where is None else f" ({_PLACES.get(where, where)})"
+    return "" if where is None else f" ({PLACES.get(where, where)})"
 
 
 def quantity(value: float, unit: str, *, change: bool = False) -> str:
