@@ -19,7 +19,6 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.arena import SHAPE_PRIOR, Arena
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.competition import Block
-from aqualog.diagnose.evidence import FARTHEST
 from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.shapes import MECHANISMS, Mechanism, Shape
 from aqualog.diagnose.spline import POINTS, Basis
@@ -55,9 +54,10 @@ def with_elements(arena: Arena) -> Arena:
         return arena
     part = arena.parts[0]
     used = part.mask
-    most = FARTHEST * np.sqrt(np.diag(arena.tolerance))  # what a fault makes of them is no deviation
-    deviations = np.clip(arena.tolerance @ arena.tolerant(arena.white())[:-1, -1], -most, most)
     white = white_noise(part.residual, used, contrasts(part.channels)).rotation
+    # what a fault makes of the car's deviations is none: they are those beside which no sample is an outlier
+    calm = replace(part, residual=np.linalg.solve(white, clipped(white @ part.residual, used, lasts=0)))
+    deviations = arena.tolerance @ arena.tolerant(replace(arena, parts=(calm,)).white())[:-1, -1]
     left = clipped(white @ (part.residual - arena.made(0, deviations[None])[0]), used)
     drive = arena.evidence.drives[part.drive]
     along = {n: drive.coordinates[n][part.at] for n in ("t", "position") if n in drive.coordinates}

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.notation import WHEELS
+from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.spline import Basis, basis
 from aqualog.diagnose.words import PLACES
 from aqualog.model.effects import EFFECTS

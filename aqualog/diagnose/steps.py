@@ -19,17 +19,21 @@ __all__ = ["EDGES", "against", "begun", "clipped", "gain_of", "intervals", "mome
 
 EDGES = 75  # of intervals, evenly over the drive
 OUTLIER = 6.0  # of the median size (4 standard deviations), beyond which a sample counts no more
-LASTS = 10  # [samples] to either side, of whose median it may be an outlier
+LASTS = 20  # [samples] to either side, of whose median it may be an outlier
 SHORTEST = 3  # edges from the begin of an interval to its end
 SHORTEST_S = 1.0  # of a change that begins; a faster one looks the same in blocks of 0.1 s
 INTERVALS, PART = 5, 0.1  # the most intervals of a form, each with this share of what the one before explains (K)
 
 
-def clipped(left: FloatArray, used: BoolArray) -> FloatArray:
-    """What is left in white noise (C, n), without outliers: a kerb or a shift of a second is no form, what lasts is."""
+def clipped(left: FloatArray, used: BoolArray, *, lasts: int = LASTS) -> FloatArray:
+    """What is left in white noise (C, n), without outliers from the median of so many samples to either side.
+
+    A kerb or a shift of a second is no form, what `lasts` longer is. Without a median none of it is.
+    """
     most = OUTLIER * np.median(np.abs(left[:, used]), axis=1, keepdims=True)
-    near = np.pad(left, [(0, 0), (LASTS, LASTS)], mode="edge")
-    most = most + np.abs(np.median(sliding_window_view(near, 2 * LASTS + 1, axis=1), axis=-1))
+    if lasts:
+        near = np.pad(left, [(0, 0), (lasts, lasts)], mode="edge")
+        most = most + np.abs(np.median(sliding_window_view(near, 2 * lasts + 1, axis=1), axis=-1))
     return np.asarray(np.clip(left, -most, most))
 
 

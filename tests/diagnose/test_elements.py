@@ -77,6 +77,16 @@ def test_two_forces_of_different_size():
     assert np.sqrt(np.mean((forms[0].f - truth(forms[0].x[:, 0])) ** 2)) < 50.0
 
 
+def test_what_comes_and_goes_often_is_no_outlier_however_large():
+    windows = ((20.0, 28.0), (90.0, 109.0), (133.0, 138.0), (170.0, 196.0))
+    truth = lambda t: 2500.0 * sum(trapezoid(t, *w, 0.1) for w in windows)  # noqa: E731
+    _, _, forms = found(11, lambda c: truth(c["t"]))
+    assert [(r.mechanism, r.depends_on) for r in forms] == [("force", ("t",))]
+    begins = [float(x) for x in re.findall(r"from (\d+) s", forms[0].manner)]
+    assert all(min(abs(b - low) for b in begins) <= 1.0 for low, _ in windows)
+    assert np.sqrt(np.mean((forms[0].f - truth(forms[0].x[:, 0])) ** 2)) < 250.0
+
+
 @pytest.mark.parametrize("seed", [13, 14, 15, 16])
 def test_slow_noise_is_no_form(seed):
     """Of the size of the forms above, with a memory of 20 s."""
@@ -105,3 +115,13 @@ def test_the_blocks_pay_for_all_that_were_tried():
     smooth = max(b.log_prior for b in a.blocks if b.kind == "shape" and b not in own)
     assert max(b.log_prior for b in own) < smooth - 3.0
     assert all(a.sd[list(b.columns)].tolist() == [150.0] * len(b.columns) for b in own)
+
+
+def test_deviations_beside_which_forms_are_sought_are_those_of_a_car(monkeypatch):
+    """A fault of many times the tolerances is no sum of them."""
+    a = arena(11, lambda c: 2500.0 * trapezoid(c["t"], 90.0, 109.0, 0.1))
+    made = []
+    monkeypatch.setattr(type(a), "made", lambda self, part, values: made.append(values) or 0.0 * values[:, :1, None])
+    with_elements(a)
+    size = np.abs(made[0][0]) / np.sqrt(np.maximum(np.diag(a.tolerance), 1e-30))
+    assert 1.0 < size.max() < 8.0

@@ -4,6 +4,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import polars as pl
 import pytest
 
 from aqualog.core.vehicle import Vehicle
@@ -27,6 +28,7 @@ from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model
 from tests.blind.world.cases import Hidden, Spec, make_case
+from tests.diagnose.test_drive import CAR, NOISY, changed, signals
 from tests.diagnose.test_subsets import KNOWN_CAR, hypothesis
 
 MASS, N, DT = 1600.0, 2400, 0.01
@@ -426,3 +428,16 @@ def test_between_axles_the_noise_of_the_velocity_cancels():
     _, share, where = unexplained._where(field, [0], [0, 1], Fitted([0, 1], np.ones(2), np.eye(2)))
     assert where == "axle_slip"
     assert share > 0.9  # of what the other member leaves
+
+
+def test_one_wheel_that_reads_low_for_a_while():
+    log = signals(sensors=NOISY, drop=("tie_rod_fl", "tie_rod_fr"))
+    t, omega = pl.col("t"), pl.col("omega_rl")
+    low = changed(
+        log,
+        log.frame.with_columns(pl.when(t.is_between(40.0, 52.0)).then(0.98 * omega).otherwise(omega).alias("omega_rl")),
+    )
+    d = diagnose([("a", low)], CAR, options=Options(surrogates=9, views=False, consequences=False))
+    assert (d.verdict, d.remainders[0].mechanism, d.remainders[0].depends_on) == ("unexplained", "radius_rl", ("t",))
+    assert d.remainders[0].manner == "from 40 s to 52 s"
+    assert np.nanmax(d.remainders[0].f) == pytest.approx(0.0204, rel=0.1)
