@@ -56,7 +56,7 @@ def with_elements(arena: Arena) -> Arena:
     used = part.mask
     white = white_noise(part.residual, used, contrasts(part.channels)).rotation
     # what a fault makes of the car's deviations is none: they are those beside which no sample is an outlier
-    calm = replace(part, residual=np.linalg.solve(white, clipped(white @ part.residual, used, lasts=0)))
+    calm = replace(part, residual=np.asarray(np.linalg.solve(white, clipped(white @ part.residual, used, lasts=0))))
     deviations = arena.tolerance @ arena.tolerant(replace(arena, parts=(calm,)).white())[:-1, -1]
     left = clipped(white @ (part.residual - arena.made(0, deviations[None])[0]), used)
     drive = arena.evidence.drives[part.drive]
