@@ -12,7 +12,7 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 95_930
+MOST_LINES = 95_940
 MOST_FILES = 518
 MOST_TEST_LINES = 69_820
 MEDIAN_MODULE = 182

@@ -39,6 +39,12 @@ def _as_page(path: Path | None) -> Path | None:
     return path.with_name(f"{path.name}.html")
 
 
+def _as_model(path: Path | None) -> Path | None:
+    if path is not None and path.suffix.lower() in (".html", ".htm"):
+        raise typer.BadParameter(f"{path}: the model is a TOML file; the page is --page")
+    return path
+
+
 def _flag(text: str, name: str) -> tuple[Any, Any]:
     return _option(bool, False, name, help=text)
 
@@ -191,7 +197,10 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
         list[str] | None, None, "--holdout", metavar="LOG",
         help="Drive on which the gain is measured and nothing is fitted; may be repeated.",
     ),
-    "out:model": _file("Extended model: a file that --model takes."),
+    "out:model": _option(
+        Path | None, None, "-o", "--out", help="Extended model: a file that --model takes.", metavar="FILE",
+        callback=_as_model,
+    ),
     "page:diagnosis": _page("Page with the pictures before and after (HTML).", "--page"),
     "level": _option(
         float, 0.01, "--level", help="Share of drives without effect that may be given one.", min=1e-4, max=0.5

@@ -109,6 +109,9 @@ def test_a_page_has_the_name_of_a_page(tmp_path):
     assert '".txt" is no page; expected a name that ends in .html' in " ".join(told.stderr.split())
     assert run("doctor", MF4, "-o", tmp_path / "page").exit_code == 0
     assert [p.name for p in tmp_path.iterdir()] == ["page.html"]
+    model = run("diagnose", MF4, "-o", tmp_path / "model.html")
+    assert model.exit_code == 2
+    assert "the model is a TOML file; the page is --page" in " ".join(model.stderr.split())
 
 
 def test_convert_with_decimal_comma(tmp_path):
