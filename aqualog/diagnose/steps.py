@@ -20,7 +20,7 @@ __all__ = ["EDGES", "against", "begun", "clipped", "gain_of", "intervals", "mome
 EDGES = 75  # of intervals, evenly over the drive
 OUTLIER = 6.0  # of the median size (4 standard deviations), beyond which a sample counts no more
 LASTS = 20  # [samples] to either side, of whose median it may be an outlier
-SHORTEST = 3  # edges from the begin of an interval to its end
+SHORTEST = 3  # edges outside of an interval, and from the drive's ends to what begins
 SHORTEST_S = 1.0  # of a change that begins; a faster one looks the same in blocks of 0.1 s
 INTERVALS, PART = 5, 0.1  # the most intervals of a form, each with this share of what the one before explains (K)
 
