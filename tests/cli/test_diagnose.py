@@ -161,7 +161,7 @@ def test_nothing_is_fitted_and_held_out(run, folder):
         (["-o", "a.parquet"], "is a source of this very run"),
         (["--page", "b.parquet", "--holdout", "b.parquet", "--force"], "is a source of this very run"),
         (["-o", "car.toml", "--force"], "is a source of this very run"),
-        (["-o", "x.html", "--page", "x.html"], "is named for two results"),
+        (["-o", "x.html", "--page", "x.html"], "the model is a TOML file"),
         (["--model", "a.parquet"], "a.parquet"),
         (["--model", "absent.toml"], "absent.toml"),
         (["--holdout", "none*.csv"], "nothing matches"),
