@@ -54,8 +54,11 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
         # a member that is too small to be worth naming is not named: its sign says nothing against the others
         return repeats(chosen, found.arena, noises, {(c.key, "".join(c.drives)) for c in best.large})
 
-    def causes_of(o: Option) -> Causes:
-        return _linear(found, o.members, model) if o.refit is None else _refitted(found, o.refit)
+    def causes_of(o: Option) -> Causes | None:
+        if o.refit is not None:
+            return _refitted(found, o.refit)
+        causes = _linear(found, o.members, model)
+        return None if any(_is_absent(c) for c, _ in causes) else causes
 
     sets = candidates([(o, o.evidence) for o in found.options], causes_of)
     d = decided(sets, lambda group: _at_place(found, group, model), failing)
@@ -71,6 +74,12 @@ def _is_bounded(cause: Cause) -> bool:
     bounds = {p.name: (p.low, p.high) for p in EFFECTS[cause.effect].parameters}
     every = cause.parameters.items()
     return any(e.value in bounds.get(n, ()) or (e.low < e.high and e.value in (e.low, e.high)) for n, e in every)
+
+
+def _is_absent(cause: Cause) -> bool:
+    """Whether a value stands at a bound that means no effect: a trailer of no mass is drag alone."""
+    own = ((p, cause.parameters.get(p.name)) for p in EFFECTS[cause.effect].parameters)
+    return any(e is not None and e.value == p.neutral and p.neutral in (p.low, p.high) for p, e in own)
 
 
 def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) -> Candidate[Option]:

@@ -17,7 +17,7 @@ from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_
 from aqualog.diagnose.spectrum import Weighing
 from aqualog.model.term import Model
 
-__all__ = ["KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "likeliest", "metric", "refit"]
+__all__ = ["KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "likeliest", "metric", "refit", "secants"]
 
 KNOWN = 0.25  # share of the tolerances that values and intervals take into account
 PRIOR_WIDTH = 3.0  # the prior is this much wider than the effect's: it only keeps huge, cancelling pairs apart
@@ -25,6 +25,7 @@ SHRINK = (1.0, 0.5, 0.2)
 ROUNDS = 6
 HOLDS = 0.1  # share by which a signature may miss its predicted gain before it is simulated again
 ENOUGH = 0.3  # of twice the log-likelihood
+SMALLEST = 1.0  # change, in steps of its parameter, from which a signature is simulated from the start to there
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,3 +227,23 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
     off = values - base
     loss -= float(((off / width) ** 2).sum())
     return Refit(members, values, off, np.asarray(covariance), loss, extended, tuple(residuals), here, bounded)
+
+
+def secants(evidence: Evidence, found: Refit, model: Model) -> tuple[FloatArray, ...]:
+    """Signatures (k, C, n) per drive from each value's start to where it was found, the others where they were found.
+
+    Where a signal is shifted, its noise would correlate with itself; there, and where nothing changed, the slope stays.
+    """
+    out = [s.copy() for s in found.signatures]
+    for k, ((h, _), off) in enumerate(zip(found.names, found.off.tolist(), strict=True)):
+        if h.effect.drive.is_shift or abs(off) < SMALLEST * h.parameter(found.names[k][1]).step:
+            continue
+        values = found.values.copy()
+        values[k] -= off
+        try:
+            without = with_free(model, found.members, values)
+            for own, d, r in zip(out, evidence.drives, found.residuals, strict=True):
+                own[k] = (residual(d, without) - r) / off
+        except ConfigError:
+            continue
+    return tuple(out)

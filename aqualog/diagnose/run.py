@@ -131,7 +131,8 @@ def _diagnosed(
     named = {c.key for c in outcome.causes}
     quiet = evidence.residuals if chosen is None else chosen.residuals
     noises = [fit_noise(r, d.mask, contrasts(d.channels)) for r, d in zip(quiet, ready, strict=True)]
-    sloped = outcome._replace(causes=tuple(c for c in outcome.causes if c.effect != "road_grade"))
+    constant = tuple(c for c in outcome.causes if c.effect == "road_grade")
+    sloped = outcome._replace(causes=tuple(c for c in outcome.causes if c not in constant))
     named_too = _extended(sloped, chosen, (), shifted, evidence.asked)
     for d in (d for d in ready if d.name in roads):
         outcome = _with_road(outcome, _road(d, named_too, roads[d.name].drive) or roads[d.name])
@@ -139,7 +140,9 @@ def _diagnosed(
     hilly = {c.drives for c in outcome.causes if c.effect == "road_grade" and "grade_rms" in c.parameters}
     other = [r.term for r in roads.values() if r.cause.drives not in hilly]
     with_roads = Model(tuple(t for t in model.terms if t not in other)) if hilly else shifted
-    extended = _extended(outcome, chosen, found.forms, with_roads, evidence.asked)
+    # a constant slope that the road's cause stands for is on its hills in the model
+    whole = outcome._replace(causes=(*outcome.causes, *(c for c in constant if c not in outcome.causes)))
+    extended = _extended(whole, chosen, found.forms, with_roads, evidence.asked)
     seen = faster([(n, s) for n, s in drives if n in names], vehicle, model, seed=options.seed)
     outcome, forms = joined(outcome, seen), (*found.forms, *seen.forms)
     least = isolate.likelier_than_none(evidence, found.arena.blocks, tolerant(evidence, COARSE * found.plain))

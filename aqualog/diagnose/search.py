@@ -27,7 +27,7 @@ from aqualog.diagnose.evidence import Evidence, forgiving, make_evidence, tolera
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_free
 from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
-from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit
+from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit, secants
 from aqualog.diagnose.sets import fitted_in
 from aqualog.diagnose.shown import silent
 from aqualog.diagnose.steps import moments
@@ -46,8 +46,8 @@ FORM = 0.3
 NEAR = 10.0  # [nats] behind the best set, within which a single effect is refitted, and the rival of each of its own
 # share of what an effect shows that a channel may show more or less than in the simulator, and an interval allows (K)
 DOUBT = 0.05
-# share of what a set explains, by which a simulator of other structure errs: one more effect has to explain more (K)
-STRUCTURE = 0.01
+# share of what a set explains, by which a simulator of other structure errs: one more effect has to explain more
+STRUCTURE = DOUBT**2
 UNUSUAL = 3.0  # of its prior's standard deviations, beyond which a value is not listed by a relation alone
 
 Tell = Callable[[str, float], None]
@@ -57,13 +57,15 @@ Tell = Callable[[str, float], None]
 class Option:
     """A set of blocks of the arena and its log evidence; `refit` None where only the linear one was computed.
 
-    `beyond`: blocks beside it that would stand at a physical bound, which its evidence needs.
+    `beyond`: blocks beside it that would stand at a physical bound, which its evidence needs; `relief`: what it gains
+    if the simulator may as well have the response exactly.
     """
 
     members: Members
     evidence: float
     refit: Refit | None = None
     beyond: Members = ()
+    relief: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +185,7 @@ def _repeated(arena: Arena, posterior: Posterior, model: Model) -> tuple[Arena, 
         found = refit(led, best, _start(arena, posterior, posterior.best), measure, model)
         if found is None or any(found.bounded):
             break
-        arena, done = _around(arena, found, best), best
+        arena, done = _around(arena, found, secants(led, found, model), best), best
         posterior = compete(arena)
     return arena, posterior
 
@@ -206,18 +208,20 @@ def _led(arena: Arena, posterior: Posterior, model: Model) -> Evidence:
         return evidence
 
 
-def _around(arena: Arena, found: Refit, chosen: Sequence[int]) -> Arena:
-    """The arena with a set's signatures at its own values.
+def _around(arena: Arena, found: Refit, slopes: Sequence[FloatArray], chosen: Sequence[int]) -> Arena:
+    """The arena with a set's signatures from the start to its own values.
 
-    Residuals are those that a linear model around these values would have had at the start, so that the competition can
-    begin again from there.
+    Residuals are those that a linear model with these `slopes` would have had at the start, so that the competition can
+    begin again from there. Then the start is as far away for the tolerances as in the simulator: a slip slope of two
+    thirds of the file's is one third off, though it shows as half as much slip again.
     """
     columns = [c for h in chosen for c in arena.evidence.columns[h]]
     parts = []
     for p in arena.parts:
-        changed = p.signatures.copy()
-        changed[columns] = found.signatures[p.drive][..., p.at]
-        parts.append(replace(p, signatures=changed, residual=found.before(p.drive)[:, p.at]))
+        own, changed = slopes[p.drive], p.signatures.copy()
+        changed[columns] = own[..., p.at]
+        start = found.residuals[p.drive] + np.tensordot(found.off, own, axes=1)
+        parts.append(replace(p, signatures=changed, residual=start[:, p.at]))
     return replace(arena, parts=tuple(parts))
 
 
@@ -261,7 +265,9 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
         # a value at a bound that means no effect: a trailer of no mass
         if found is None or (any(found.bounded) and np.any(np.abs(found.off) < 1e-12)):
             return None
-        return Option(members, _evidence(arena, found, own, measure, nothing), found)
+        doubted, exact = _evidence(arena, found, own, measure, nothing)
+        relief = max(float(np.logaddexp(doubted, exact)) - math.log(2.0) - doubted, 0.0)
+        return Option(members, doubted, found, relief=relief)
 
     done: dict[Members, Option | None] = dict(zip(chosen, beside(one, chosen), strict=True))
     # an effect that does not show where it acts is out of every set; what remains may stand, if all of it shows
@@ -286,7 +292,7 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     # water is not linear: without any effect, the simulator may differ from what signatures say of it
     y = measure.rows([residual(d, model)[None] for d in evidence.drives])
     bare = nothing - 0.5 * float(measure.inner(y, y)[0, 0])
-    out = {m: o for m, o in done.items() if o is not None} | {(): Option((), bare)}
+    out = _relieved({m: o for m, o in done.items() if o is not None}) | {(): Option((), bare)}
     if best in out and best:
         # what the simulator says more or less of the best set than its signatures, it would say of the others too
         shift = out[best].evidence - linear[best]
@@ -300,6 +306,18 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     out = {m: o for m, o in out.items() if (within.get(m, m) == m if o.refit else not beyond & set(m))}
     none = max(bare, max(o.evidence for o in out.values()) - posterior.most)
     return _levelled(evidence, arena, out | {(): Option((), none)}, within.get(best, best), equal)
+
+
+def _relieved(options: dict[Members, Option]) -> dict[Members, Option]:
+    """Options where the simulator may as well have the response exactly.
+
+    Of a set, no more than of any smaller one in it: one more effect must not make up for a response that is not exact.
+    """
+    out = {}
+    for members, o in options.items():
+        least = min(own.relief for m, own in options.items() if set(m) <= set(members))
+        out[members] = replace(o, evidence=o.evidence + least)
+    return out
 
 
 def _levelled(
@@ -330,8 +348,11 @@ def _levelled(
     return out
 
 
-def _evidence(arena: Arena, found: Refit, own: Sequence[int], measure: Metric, nothing: float) -> float:
-    """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values.
+def _evidence(
+    arena: Arena, found: Refit, own: Sequence[int], measure: Metric, nothing: float
+) -> tuple[float, float]:  # fmt: skip
+    """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values: with doubts
+    in what it shows, and where the simulator has this exactly.
 
     `nothing`: half the sum of squares without any effect.
     """
@@ -343,11 +364,16 @@ def _evidence(arena: Arena, found: Refit, own: Sequence[int], measure: Metric, n
     order = [*range(len(J)), *range(len(exact), len(exact) + len(doubts)), len(J)]  # the residual last
     shared = measure.inner(exact, doubts)
     gram = np.block([[measure.inner(exact, exact), shared], [shared.T, measure.inner(doubts, doubts)]])
-    allowed = np.diag(DOUBT**2 * (np.arange(len(order) - 1) >= len(J)))
-    forgiven = forgiving(gram[np.ix_(order, order)], allowed)
     by_tag = {b.tag: b for b in arena.blocks}
-    state = joined(forgiven.gram, placed([by_tag[h] for h in own]), range(len(own)))
-    return state.evidence + nothing - 0.5 * float(forgiven.gram[-1, -1]) - forgiven.room
+    blocks = placed([by_tag[h] for h in own])
+
+    def under(doubt: float) -> float:
+        allowed = np.diag(doubt**2 * (np.arange(len(order) - 1) >= len(J)))
+        forgiven = forgiving(gram[np.ix_(order, order)], allowed)
+        gained = joined(forgiven.gram, blocks, range(len(own))).evidence
+        return gained + nothing - 0.5 * float(forgiven.gram[-1, -1]) - forgiven.room
+
+    return under(DOUBT), under(0.0)
 
 
 def _doubtful(arena: Arena, found: Refit) -> list[FloatArray]:

@@ -79,12 +79,20 @@ class Outcome(NamedTuple, Generic[Option]):
         return self._replace(verdict=verdict, causes=causes, certain=self.certain | {c.effect for c in sure})
 
 
-def candidates(options: Sequence[tuple[Option, float]], causes: Callable[[Option], Causes]) -> list[Candidate[Option]]:
-    """Options and their log evidence as sets with causes, most likely first, without those that hardly count."""
+def candidates(
+    options: Sequence[tuple[Option, float]], causes: Callable[[Option], Causes | None]
+) -> list[Candidate[Option]]:  # fmt: skip
+    """Options and their log evidence as sets with causes, most likely first, without those that hardly count.
+
+    None for causes: a set that stands for another one, which has its share.
+    """
     if not options:
         return []
     p = shares([e for _, e in options]).tolist()
-    out = [Candidate(o, causes(o), e, q) for (o, e), q in zip(options, p, strict=True) if q >= LEAST_SHARE]
+    each = [(o, causes(o), e) for (o, e), q in zip(options, p, strict=True) if q >= LEAST_SHARE]
+    kept = [(o, own, e) for o, own, e in each if own is not None]
+    p = shares([e for *_, e in kept]).tolist() if kept else []
+    out = [Candidate(o, own, e, q) for (o, own, e), q in zip(kept, p, strict=True)]
     return sorted(out, key=lambda s: -s.share)
 
 
@@ -144,7 +152,7 @@ def decided(
     certain = frozenset(c.effect for c in own if not failed and c.name not in unsure)
     # the best set whole, one effect at two places too; of the others what it does not have
     more = {c.name: c for a in reversed(others) for c in a.causes if c.name not in best.names}
-    shown = sorted([*own, *torn.values(), *more.values()], key=lambda c: c.effect not in certain)
+    shown = sorted([*own, *torn.values(), *more.values()], key=lambda c: (c.effect not in certain, -c.probability))
     notes += tuple(f"Not named: {reason}" for reason in failed)
     remain = tuple((s, q / total) for s, q in rivals)
     return Outcome("cannot_tell", tuple(shown), others, best, certain, remain, notes)

@@ -40,7 +40,7 @@ def case(values, signatures, seen):
 
 def evidence(values, signatures, seen):
     arena, found = case(values, signatures, seen)
-    return search._evidence(arena, found, range(len(values)), Plain(), 0.5 * float((seen**2).sum()))
+    return search._evidence(arena, found, range(len(values)), Plain(), 0.5 * float((seen**2).sum()))[0]
 
 
 def drawn():

@@ -93,6 +93,13 @@ def test_an_interval_ends_at_the_physical_bound():
     assert told(option(road_grade=0.19)).causes[0].parameters["grade"].high == 0.2
 
 
+def test_a_trailer_of_no_mass_is_drag_alone(monkeypatch):
+    own = {"mass": Estimate(0.0, 0.0, 60.0, "kg"), "delta_drag_area": Estimate(0.4, 0.3, 0.5, "m2")}
+    monkeypatch.setattr(outcome, "_linear", lambda *_: ((Cause("trailer", None, own, (), "."), True),))
+    found = told(option(aero_drag=0.4), Option((0,), SURE))
+    assert (found.verdict, names(found)) == ("named", ["aero_drag"])
+
+
 def test_one_set_of_two_is_compound():
     o = told(option(payload_mass=200.0, tyre_radius_fl=0.01))
     assert o.verdict == "compound"

@@ -12,7 +12,7 @@ from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.evidence import FARTHEST
 from aqualog.diagnose.hypotheses import Hypothesis, residual, with_values
 from aqualog.diagnose.hypotheses import simulated as shown
-from aqualog.diagnose.refit import KNOWN, likeliest, metric, refit
+from aqualog.diagnose.refit import KNOWN, likeliest, metric, refit, secants
 from aqualog.diagnose.search import simulated
 from aqualog.diagnose.sets import fitted_in
 from aqualog.diagnose.tolerances import TOLERANCES
@@ -107,6 +107,14 @@ def test_a_linear_start_that_is_far_off_is_corrected_too():
     assert refitted(evidence, start, measure).values[0] == pytest.approx(0.6, abs=0.02)
 
 
+def test_a_secant_leads_from_a_value_back_to_the_start():
+    evidence, start, measure = prepared([one("slip_stiffness", "rl")], term("slip_stiffness", "rl", gain=0.6))
+    r = refitted(evidence, start, measure)
+    (own,) = secants(evidence, r, Model())
+    np.testing.assert_allclose(r.residuals[0] + r.off[0] * own[0], evidence.residuals[0], atol=1e-9)
+    assert np.abs(r.before(0) - evidence.residuals[0]).max() > 0.01  # the slope there overshoots
+
+
 def test_a_start_far_away_ends_at_the_same_value():
     h = one("payload_mass")
     evidence, start, measure = prepared([h], term("payload_mass", delta_mass=250.0))
@@ -146,6 +154,11 @@ def test_the_metric_is_that_of_the_tolerant_inner_products():
     assert float(half.inner(y, y)[0, 0]) == pytest.approx(
         arena.tolerant(0.5 * arena.inner(measure.weighings))[-1, -1], rel=1e-5
     )
+
+
+def test_one_more_effect_is_not_relieved_of_doubts_in_what_the_first_shows():
+    own = {(1,): search.Option((1,), 5.0, relief=2.0), (1, 2): search.Option((1, 2), 6.0, relief=7.0)}
+    assert [o.evidence for o in search._relieved(own).values()] == [7.0, 8.0]
 
 
 def test_the_nearest_rival_of_each_effect_is_refitted(monkeypatch):

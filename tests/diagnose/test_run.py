@@ -326,6 +326,7 @@ def test_a_road_that_falls_on_the_whole_has_its_mean(monkeypatch):
     assert road.grid[:, 1].mean() < -0.02
     assert d.sentence.endswith(f" On the whole it falls by {-e.value:.1%}.")
     assert e.low < road.grid[:, 1].mean() < e.high
+    assert {t.effect.name for t in d.model.terms} == {"unexplained_grade", "road_grade"}  # hills and mean
 
 
 def test_the_torque_is_judged_without_an_accelerometer(monkeypatch):

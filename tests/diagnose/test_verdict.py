@@ -40,6 +40,12 @@ def test_one_effect_at_two_places_is_listed_at_both():
     assert [c.key for c in found.causes] == ["drag@f", "drag@r", "slope"]
 
 
+def test_a_set_that_stands_for_another_leaves_it_its_share():
+    options = [("drag", 0.0), ("trailer of nothing", 0.0)]
+    (only,) = candidates(options, lambda name: (cause(name),) if name == "drag" else None)
+    assert (only.names, only.share) == ({"drag"}, 1.0)
+
+
 def test_the_same_names_at_other_places_count_together():
     found = verdict([([cause("drag", "f")], 0.0), ([cause("drag", "r")], -0.5), ([cause("slope")], -15.0)])
     assert found.verdict == "named"
