@@ -109,7 +109,8 @@ def _gain_advice(gain: float, car: Vehicle, axles: list[str]) -> str:
     values = {"torque_gain": gain * car.torque_gain, "mass": car.mass / gain}
     if all(KEYS[n].low <= x <= KEYS[n].high for n, x in values.items()):
         own = f"torque_gain = {values['torque_gain']:.3g}, or mass = {values['mass']:.0f}"
-        return f"in the vehicle file {own}; `aqualog calibrate` estimates them"
+        loaded = "unless a load or a trailer explains it, " if gain < 1.0 else ""
+        return f"{loaded}in the vehicle file {own}; `aqualog calibrate` estimates them"
     size = f"{1.0 / gain:.3g} times too large" if gain < 1.0 else f"{gain:.3g} times too small"
     names = " and ".join(f"torque_{a}" for a in axles)
     return f"check unit and scale of {names} in the map: {'it is' if len(axles) == 1 else 'they are'} {size}"

@@ -33,38 +33,56 @@ def _channel(signal: str, change: Callable[[Channel, float], Channel]) -> Callab
     return apply
 
 
-def _of(name: str, unit: str, sd: float, apply: Callable[[Setup, Mapping[str, float], str | None], Setup]) -> Effect:
+def _of(
+    name: str, what: str, unit: str, sd: float, apply: Callable[[Setup, Mapping[str, float], str | None], Setup]
+) -> Effect:
     by = Parameter("by", unit, 0.0, sd, -20.0 * sd, 20.0 * sd, sd, "deviation; sigma is the tolerance (K)")
-    return Effect(name, "tolerance", "", "general knowledge", (by,), apply)
+    return Effect(name, what, "", "general knowledge", (by,), apply)
 
 
 TOLERANCES: tuple[Effect, ...] = (
-    _of("track", "-", 0.02, _plant(lambda p, x: p._replace(track=p.track * (1.0 + x)))),
-    _of("h_cg", "-", 0.1, _plant(lambda p, x: p._replace(h_cg=p.h_cg * (1.0 + x)))),
-    _of("axle_distance", "m", 0.03, _plant(lambda p, x: p._replace(l_f=p.l_f + x, l_r=p.l_r - x))),
-    _of("yaw_inertia", "-", 0.2, _plant(lambda p, x: p._replace(I_zz=p.I_zz * max(1.0 + x, 0.05)))),
-    _of("cornering_front", "-", 0.2, _plant(lambda p, x: p._replace(
+    _of("track", "track width, relative", "-", 0.02, _plant(lambda p, x: p._replace(track=p.track * (1.0 + x)))),
+    _of("h_cg", "height of the centre of mass, relative", "-", 0.1,
+        _plant(lambda p, x: p._replace(h_cg=p.h_cg * (1.0 + x)))),
+    _of("axle_distance", "the centre of mass nearer to the rear axle", "m", 0.03,
+        _plant(lambda p, x: p._replace(l_f=p.l_f + x, l_r=p.l_r - x))),
+    _of("yaw_inertia", "yaw inertia, relative", "-", 0.2,
+        _plant(lambda p, x: p._replace(I_zz=p.I_zz * max(1.0 + x, 0.05)))),
+    _of("cornering_front", "cornering stiffness, front, relative", "-", 0.2, _plant(lambda p, x: p._replace(
         cornering_slope=p.cornering_slope * [1.0 + x, 1.0 + x, 1.0, 1.0]))),
-    _of("cornering_rear", "-", 0.2, _plant(lambda p, x: p._replace(
+    _of("cornering_rear", "cornering stiffness, rear, relative", "-", 0.2, _plant(lambda p, x: p._replace(
         cornering_slope=p.cornering_slope * [1.0, 1.0, 1.0 + x, 1.0 + x]))),
-    _of("friction", "-", 0.5, _plant(lambda p, x: p._replace(mu=p.mu * max(1.0 + x, 0.3)))),
-    _of("radius_loss", "-", 0.005, _plant(lambda p, x: p._replace(radius_loss=p.radius_loss + x))),
-    _of("antenna_height", "s^2", 0.01, _channel("v_x", lambda c, x: replace(c, pitching=c.pitching + x))),
-    _of("steer_offset", "rad", 5e-3, _channel("steer_angle", lambda c, x: replace(c, bias=c.bias + x))),
-    _of("steer_gain", "-", 0.03, _channel("steer_angle", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
-    _of("gyro_offset", "rad/s", 2e-3, _channel("yaw_rate", lambda c, x: replace(c, bias=c.bias + x))),
-    _of("gyro_gain", "-", 0.02, _channel("yaw_rate", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
+    _of("friction", "peak of the tyre's curve, relative: how early the curve bends", "-", 0.5,
+        _plant(lambda p, x: p._replace(mu=p.mu * max(1.0 + x, 0.3)))),
+    _of("radius_loss", "radius over wheel load, relative", "-", 0.005,
+        _plant(lambda p, x: p._replace(radius_loss=p.radius_loss + x))),
+    _of("antenna_height", "speed of the antenna by pitching, over the rate of a_x", "s^2", 0.01,
+        _channel("v_x", lambda c, x: replace(c, pitching=c.pitching + x))),
+    _of("steer_offset", "offset of the steering angle", "rad", 5e-3,
+        _channel("steer_angle", lambda c, x: replace(c, bias=c.bias + x))),
+    _of("steer_gain", "gain of the steering angle, relative", "-", 0.03,
+        _channel("steer_angle", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
+    _of("gyro_offset", "offset of the yaw rate", "rad/s", 2e-3,
+        _channel("yaw_rate", lambda c, x: replace(c, bias=c.bias + x))),
+    _of("gyro_gain", "gain of the yaw rate, relative", "-", 0.02,
+        _channel("yaw_rate", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
 )  # fmt: skip
 
 # the torque that the model needs on a flat road, in place of a missing one: load, wind and slopes are not in it
-STAND_IN = _of("stand_in_torque", "-", 0.2, _plant(lambda p, x: p._replace(torque_gain=p.torque_gain * (1.0 + x))))
+STAND_IN = _of(
+    "stand_in_torque",
+    "torque in place of a missing one, relative",
+    "-",
+    0.2,
+    _plant(lambda p, x: p._replace(torque_gain=p.torque_gain * (1.0 + x))),
+)
 
 # What one lane may differ by from the other lanes, of the size of an effect on all of them: its depth is known to 15 %,
 # and the form of a law makes another error at each depth and speed. From sources, full aquaplaning falls with depth as
 # h^-0.06 to h^-0.26, which is 18 % of the lost contact between 0.6 and 1.3 mm (K); drag within a factor of two (D).
 _LANES = (("contact_loss", ("f", "r"), 0.2), ("water_drag", ("f", "r"), 0.3), ("uneven_water", ("left", "right"), 0.15))
 LANE_TOLERANCES: dict[tuple[str, str], Effect] = {
-    (effect, where): _of(f"{effect}_{where}_by_lane", "-", sd, lambda setup, _v, _w: setup)
+    (effect, where): _of(f"{effect}_{where}_by_lane", "one lane's own, relative", "-", sd, lambda setup, _v, _w: setup)
     for effect, places, sd in _LANES
     for where in places
 }

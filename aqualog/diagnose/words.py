@@ -57,13 +57,14 @@ def cause_sentence(
     if effect.less and first.value < 0.0:
         sentence, values[name] = effect.less, -first.value
         low, high = -high, -low
-    text = sentence.format(where=where or "", **values).rstrip(".")
+    text = sentence.format(where=where or "", at=place(where), **values).rstrip(".")
     if any(n == name and (spec or "").endswith("%") for _, n, spec, _ in Formatter().parse(sentence)):
         # in the unit in which the sentence has the value
         low, high, unit = 100.0 * low, 100.0 * high, "%"
     only = f" In {listed(drives)} only." if drives else ""
     told = "" if unit == "-" else f" {displayed_unit(unit)}"
-    return f"{text}{'' if '{where}' in sentence else place(where)}; 95 % interval {_span(low, high)}{told}.{only}"
+    is_said = "{where}" in sentence or place(where).strip(" ()") in text
+    return f"{text}{'' if is_said else place(where)}; 95 % interval {_span(low, high)}{told}.{only}"
 
 
 def _span(low: float, high: float) -> str:

@@ -229,7 +229,7 @@ _ALL = [
         belongs="drive",
     ),
     Effect(
-        "water_drag", "drag of film and bow wave on the wheels", "Film and bow wave drag {gain:.2f} times as much.",
+        "water_drag", "drag of film and bow wave on the wheels", "Film and bow wave drag {gain:.2f} times as much{at}.",
         "momentum estimate within a factor of two (D)",
         (Parameter("gain", "-", 1.0, 0.4, 0.0, 5.0, 0.3, "on film and wave"),),
         _times(water_drag_gain="gain"), _WHEEL_PLACES,
@@ -240,7 +240,8 @@ _ALL = [
         ), belongs="tyre",
     ),
     Effect(
-        "brake_drag", "torque against a wheel [N·m]", "The brake drags with {torque:.0f} N·m.", "a few N·m a wheel (K)",
+        "brake_drag", "torque against a wheel [N·m]", "The brake{at} drags with {torque:.0f} N·m.",
+        "a few N·m a wheel (K)",
         (Parameter("torque", "N*m", 0.0, 10.0, -5.0, 300.0, 2.0, "per wheel",
             DayToDay("rolling", _as_brake)),),
         _plus(brake_drag="torque"), _WHEEL_PLACES,
@@ -284,7 +285,8 @@ _ALL = [
         drive=DriveSearch((_TORQUE,), count=2, tolerance=0.0), belongs="drive",
     ),
     Effect(
-        "wheel_inertia", "inertia of the wheels [kg·m²]", "The inertia per wheel is {delta_inertia:+.2f} kg·m² off.",
+        "wheel_inertia", "inertia of the wheels [kg·m²]",
+        "The inertia per wheel{at} is {delta_inertia:+.2f} kg·m² off.",
         "1.0-1.8 with the driveline (K)",
         (Parameter("delta_inertia", "kg*m^2", 0.0, 0.5, -0.9, 20.0, 0.1, "per wheel",
             DayToDay("inertia", _as_inertia)),),
@@ -294,7 +296,7 @@ _ALL = [
         drive=DriveSearch((_TORQUE,), tolerance=0.15, axle_key="wheels.inertia_", most_free=1.5),  # a second wheel (K)
     ),
     Effect(
-        "accelerometer_bias", "accelerometer [m/s²]", "The accelerometer is off by {bias:+.2f} m/s².",
+        "accelerometer_bias", "accelerometer [m/s²]", "The accelerometer{at} is off by {bias:+.2f} m/s².",
         "ESC sensors ±50-100 mg, 20 mg short term (V)",
         (Parameter("bias", "m/s^2", 0.0, 0.2, -2.0, 2.0, 0.03, "added"),),
         _on_channels(lambda c, v: replace(c, bias=c.bias + v["bias"])), ("a_x", "a_y"), "a_x", twins=("road_grade",),
@@ -302,13 +304,14 @@ _ALL = [
             places=_PAIR, tolerance_at={"a_y": 0.1}, equals=_LIKE_AN_OFFSET, check=STANDSTILL),
     ),
     Effect(
-        "accelerometer_gain", "accelerometer [-]", "The accelerometer reads {gain:.3f} times the truth.", "1-3 % (K)",
+        "accelerometer_gain", "accelerometer [-]", "The accelerometer{at} reads {gain:.3f} times the truth.",
+        "1-3 % (K)",
         (Parameter("gain", "-", 1.0, 0.02, 0.5, 1.5, 0.01, "on the true value"),),
         _on_channels(lambda c, v: replace(c, gain=c.gain * v["gain"])), ("a_x", "a_y"), "a_x",
         drive=DriveSearch(places=_PAIR, tolerance_at={"a_x": 0.012, "a_y": 0.03}),  # pitch of 0.07 degrees per m/s² (K)
     ),
     Effect(
-        "accelerometer_drift", "accelerometer [m/s³]", "The accelerometer drifts by {drift:.1e} m/s² a second.",
+        "accelerometer_drift", "accelerometer [m/s³]", "The accelerometer{at} drifts by {drift:.1e} m/s² a second.",
         "20 mg short term (V)",
         (Parameter("drift", "m/s^3", 0.0, 5e-4, -0.02, 0.02, 1e-4, "from the start"),),
         _on_channels(lambda c, v: replace(c, drift=c.drift + v["drift"])), ("a_x", "a_y"), "a_x",
@@ -324,15 +327,15 @@ _ALL = [
         less="The accelerometer sits {ahead:.2f} m behind the centre of gravity.",
     ),
     Effect(
-        "signal_delay", "delay of a signal [s]", "The signal comes {delay:.3f} s late.", "GNSS up to 0.5 s (V)",
+        "signal_delay", "delay of a signal [s]", "The signal{at} comes {delay:.3f} s late.", "GNSS up to 0.5 s (V)",
         (Parameter("delay", "s", 0.0, 0.1, -1.0, 2.0, 0.01, "late positive"),),
         _on_channels(lambda c, v: replace(c, delay_s=c.delay_s + v["delay"])), _SIGNALS, "v_x", twins=("clock_skew",),
         drive=DriveSearch(
             places=("v_x", "a_x", "omega", "torque", "a_y", "yaw_rate"), tolerance=0.01, tolerance_at=_SIDE_SLIP,
-            is_shift=True, is_relative=True), less="The signal comes {delay:.3f} s early.",
+            is_shift=True, is_relative=True), less="The signal{at} comes {delay:.3f} s early.",
     ),
     Effect(
-        "tone_ring", "wheel-speed pick-up [-]", "The tone ring of the wheel is uneven by {amplitude:.2%}.",
+        "tone_ring", "wheel-speed pick-up [-]", "The tone ring{at} is uneven by {amplitude:.2%}.",
         "6.8e-4 per tooth (V, Gustafsson [gustafsson2000])",
         (Parameter("amplitude", "-", 0.0, 0.002, 0.0, 0.05, 0.002, "once per turn, relative"),), _tone_ring,
         _WHEEL_PLACES,
@@ -346,7 +349,7 @@ _ALL = [
         drive=DriveSearch(places=("v_x",)),
     ),
     Effect(
-        "slip_stiffness", "slip slope C_s / F_z [-]", "The slip slope is {gain:.2f} times the vehicle file's.",
+        "slip_stiffness", "slip slope C_s / F_z [-]", "The slip slope{at} is {gain:.2f} times the vehicle file's.",
         "15-50 over tyres (K); temperature, wear (V, Carlson and Gerdes [carlson2005])",
         (Parameter("gain", "-", 1.0, 0.2, 0.2, 2.5, 0.05, "on the dry slope; 50 over 20"),),
         _times(slip_slope="gain"), _WHEEL_PLACES,
@@ -357,7 +360,7 @@ _ALL = [
         ), belongs="tyre",
     ),
     Effect(
-        "slip_stiffness_drift", "slip slope over time [1/s]", "The slip slope changes by {rate:.1e} a second.",
+        "slip_stiffness_drift", "slip slope over time [1/s]", "The slip slope{at} changes by {rate:.1e} a second.",
         "-0.4 to -1 %/K (K)",
         (Parameter("rate", "1/s", 0.0, 2e-4, -0.01, 0.01, 5e-5, "relative, exp(rate t)"),),
         _plus(slip_slope_drift="rate"),
@@ -365,7 +368,7 @@ _ALL = [
         drive=DriveSearch((_SPEEDS,), doubt=_CURVE), belongs="drive",
     ),
     Effect(
-        "load_sensitivity", "slip slope over load [-]", "The slip slope follows the load by {delta:+.2f} more.",
+        "load_sensitivity", "slip slope over load [-]", "The slip slope{at} follows the load by {delta:+.2f} more.",
         "0.22 in MF6.1 (V, [besselink2010])",
         (Parameter("delta", "-", 0.0, 0.2, -2.0, 2.0, 0.1, "on the tyre's own"),),
         _plus(load_sensitivity="delta"),
@@ -376,7 +379,7 @@ _ALL = [
         ), belongs="tyre",
     ),
     Effect(
-        "tyre_radius", "rolling radius [-]", "The tyre has a radius {delta:+.2%} off.", "±0.3 % (D), wear 1 % (K)",
+        "tyre_radius", "rolling radius [-]", "The tyre{at} has a radius {delta:+.2%} off.", "±0.3 % (D), wear 1 % (K)",
         (Parameter("delta", "-", 0.0, 0.005, -0.1, 0.1, 0.001, "relative, effective and loaded"),),
         _on_plant(lambda p, v, w: p._replace(
             **{n: _changed(getattr(p, n), w, np.multiply, 1.0 + v["delta"]) for n in ("r_e", "r_l")})),
@@ -384,7 +387,8 @@ _ALL = [
         drive=DriveSearch((_SPEEDS,), by_wheel=True, axle_key="wheels.r_e_", check=ROLLED), belongs="tyre",
     ),
     Effect(
-        "pressure_loss", "radius and slip slope of a tyre that loses its air", "The tyre lost its air.",
+        "pressure_loss", "radius and slip slope of a tyre that loses its air",
+        "The tyre{at} loses air from {start:.0f} s on, and {radius:.2%} of its radius.",
         "-20 % of the pressure: -1.5 % of the loaded radius, the rolling radius less (V)",
         (
             Parameter("radius", "-", 0.0, 0.008, 0.0, 0.1, 0.001, "share of the radius that is lost in the end"),
@@ -400,14 +404,15 @@ _ALL = [
         belongs="moment",
     ),
     Effect(
-        "tyre_radius_growth", "rolling radius over speed [s^2/m^2]", "The tyre grows with speed.",
+        "tyre_radius_growth", "rolling radius over speed [s^2/m^2]",
+        "The tyre{at} grows by {growth:.1e} v_x² of its radius.",
         "2.9e-6 in MF6.1 (V, D, [besselink2010])",
         (Parameter("growth", "s^2/m^2", 0.0, 2e-6, -1e-5, 3e-5, 1e-6, "r_e (1 + growth v^2)"),),
         _plus(radius_growth="growth"), _WHEEL_PLACES,
         drive=DriveSearch((_SPEEDS,)),
     ),
     Effect(
-        "relaxation_length", "build-up of tyre forces [m]", "Tyre forces build up over {length:.2f} m.",
+        "relaxation_length", "build-up of tyre forces [m]", "Tyre forces{at} build up over {length:.2f} m.",
         "0.12-0.45 m (V)",
         (Parameter("length", "m", 0.0, 0.3, 0.0, 3.0, 0.05, "longitudinal and lateral"),),
         _plus(relaxation_length="length"),
@@ -415,7 +420,7 @@ _ALL = [
         drive=DriveSearch((_SPEEDS,), tolerance=0.3, is_quick=True), belongs="tyre",
     ),
     Effect(
-        "contact_loss", "lost contact on water [-]", "The water lifts {gain:.2f} times as much of the contact.",
+        "contact_loss", "lost contact on water [-]", "The water lifts {gain:.2f} times as much of the contact{at}.",
         "shape assumed (D)",
         (Parameter("gain", "-", 1.0, 0.3, 0.0, 5.0, 0.3, "on the lost share"),),
         _times(contact_gain="gain"), _WHEEL_PLACES,
@@ -452,7 +457,7 @@ _ALL = [
         ), belongs="drive",
     ),
     Effect(
-        "clock_skew", "clock of a bus [ppm]", "The clock of the signal runs {skew:.0f} ppm off.",
+        "clock_skew", "clock of a bus [ppm]", "The clock of the signal{at} runs {skew:.0f} ppm off.",
         "quartz 20-100 ppm (K)",
         (Parameter("skew", "ppm", 0.0, 100.0, -1e5, 1e5, 20.0, "fast positive"),), _clock_skew, _SIGNALS, "v_x",
         twins=("signal_delay",),

@@ -220,9 +220,7 @@ def test_causes_by_wheel_axle_and_side():
     one = to_causes([answer("fl", 3e-3)])
     assert [(c.effect, c.where, c.explains) for c in one] == [("tone_ring", "fl", ("omega_fl",))]
     assert one[0].parameters["amplitude"].value == pytest.approx(3e-3)
-    assert one[0].sentence == (
-        "The tone ring of the wheel is uneven by 0.30% (front left wheel); 95 % interval 0.27 to 0.33 %."
-    )
+    assert one[0].sentence == ("The tone ring (front left wheel) is uneven by 0.30%; 95 % interval 0.27 to 0.33 %.")
     assert [c.where for c in to_causes([answer("fl", 3e-3), answer("fr", 3.1e-3)])] == ["f"]
     assert [c.where for c in to_causes([answer("fl", 3e-3), answer("rl", 3e-3)])] == ["left"]
     assert {c.where for c in to_causes([answer("fl", 3e-3), answer("fr", 2.5e-3)])} == {"fl", "fr"}

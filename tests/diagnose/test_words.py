@@ -24,12 +24,23 @@ def told(effect, where, **estimates):
             "a_x",
             "delay",
             Estimate(-0.106, -0.11, -0.1, "s"),
-            "comes 0.106 s early (longitudinal); 95 % interval 0.100 to 0.110 s.",
+            "The signal (longitudinal) comes 0.106 s early; 95 % interval 0.100 to 0.110 s.",
         ),
     ],
 )
 def test_an_interval_has_the_digits_that_tell_its_ends_apart(effect, where, name, estimate, ends):
     assert told(effect, where, **{name: estimate}).endswith(ends)
+
+
+def test_a_sentence_has_its_place_once():
+    e = {"scale": Estimate(0.97, 0.969, 0.971, "-")}
+    assert (
+        told("velocity_scale", "v_x", **e)
+        == "The reference velocity reads 0.9700 times the truth; 95 % interval 0.9690 to 0.9710."
+    )
+    assert told("payload_mass", "f", delta_mass=Estimate(50.0, 40.0, 60.0, "kg")).startswith(
+        "The car weighed 50 kg more than the vehicle file says (front axle);"
+    )
 
 
 def test_an_interval_has_the_unit_of_the_value():

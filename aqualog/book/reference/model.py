@@ -19,6 +19,7 @@ from aqualog.core.vehicle import (
     WaterNumber,
     vehicle_toml,
 )
+from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model.effects import EFFECTS, EMPIRICAL
 from aqualog.model.term import Effect
 from aqualog.model.tyre import TYRE_KEYS
@@ -224,12 +225,21 @@ def effects_page() -> str:
         "## Functions",
         _FUNCTIONS,
         table(("effect", "acts on", "knots", "bounds of x", "bounds of the value"), map(_function, EMPIRICAL.values())),
+        "## Deviations",
+        "No vehicle file and no simulator has these exactly. `diagnose` allows for them and names none as a cause; the "
+        "document lists what is likeliest as `deviations`, with the value `by`. Effects above may be there, too.",
+        table(("deviation", "of", "unit", "allowed ±"), map(_deviation, TOLERANCES)),
     )
 
 
 def _effect(effect: Effect) -> tuple[str, ...]:
     twins = ", ".join(map(code, effect.twins))
     return code(effect.name), effect.target, _places(effect.places), twins, effect.source
+
+
+def _deviation(effect: Effect) -> tuple[str, ...]:
+    (by,) = effect.parameters
+    return code(effect.name), effect.target, by.unit, f"{by.sigma:g}"
 
 
 def _places(places: tuple[str, ...]) -> str:
