@@ -242,10 +242,8 @@ _ALL = [
     Effect(
         "brake_drag", "torque against a wheel [N·m]", "The brake{at} drags with {torque:.0f} N·m.",
         "a few N·m a wheel (K)",
-        (Parameter("torque", "N*m", 0.0, 10.0, -5.0, 300.0, 2.0, "per wheel",
-            DayToDay("rolling", _as_brake)),),
-        _plus(brake_drag="torque"), _WHEEL_PLACES,
-        twins=("rolling_resistance",),
+        (Parameter("torque", "N*m", 0.0, 10.0, -5.0, 300.0, 2.0, "per wheel", DayToDay("rolling", _as_brake)),),
+        _plus(brake_drag="torque"), _WHEEL_PLACES, twins=("rolling_resistance",),
         drive=DriveSearch((_TORQUE,), by_wheel=True, check=JACKED),
     ),
     Effect(
@@ -286,8 +284,7 @@ _ALL = [
     ),
     Effect(
         "wheel_inertia", "inertia of the wheels [kg·m²]",
-        "The inertia per wheel{at} is {delta_inertia:+.2f} kg·m² off.",
-        "1.0-1.8 with the driveline (K)",
+        "The inertia per wheel{at} is {delta_inertia:+.2f} kg·m² off.", "1.0-1.8 with the driveline (K)",
         (Parameter("delta_inertia", "kg*m^2", 0.0, 0.5, -0.9, 20.0, 0.1, "per wheel",
             DayToDay("inertia", _as_inertia)),),
         _on_plant(lambda p, v, w: p._replace(
@@ -300,8 +297,7 @@ _ALL = [
         "ESC sensors ±50-100 mg, 20 mg short term (V)",
         (Parameter("bias", "m/s^2", 0.0, 0.2, -2.0, 2.0, 0.03, "added"),),
         _on_channels(lambda c, v: replace(c, bias=c.bias + v["bias"])), ("a_x", "a_y"), "a_x", twins=("road_grade",),
-        drive=DriveSearch(
-            places=_PAIR, tolerance_at={"a_y": 0.1}, equals=_LIKE_AN_OFFSET, check=STANDSTILL),
+        drive=DriveSearch(places=_PAIR, tolerance_at={"a_y": 0.1}, equals=_LIKE_AN_OFFSET, check=STANDSTILL),
     ),
     Effect(
         "accelerometer_gain", "accelerometer [-]", "The accelerometer{at} reads {gain:.3f} times the truth.",
@@ -405,8 +401,7 @@ _ALL = [
     ),
     Effect(
         "tyre_radius_growth", "rolling radius over speed [s^2/m^2]",
-        "The tyre{at} grows by {growth:.1e} v_x² of its radius.",
-        "2.9e-6 in MF6.1 (V, D, [besselink2010])",
+        "The tyre{at} grows by {growth:.1e} v_x² of its radius.", "2.9e-6 in MF6.1 (V, D, [besselink2010])",
         (Parameter("growth", "s^2/m^2", 0.0, 2e-6, -1e-5, 3e-5, 1e-6, "r_e (1 + growth v^2)"),),
         _plus(radius_growth="growth"), _WHEEL_PLACES,
         drive=DriveSearch((_SPEEDS,)),
