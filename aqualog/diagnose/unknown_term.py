@@ -11,7 +11,7 @@ import numpy as np
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.shapes import MECHANISMS, Mechanism
-from aqualog.diagnose.words import listed, quantity
+from aqualog.diagnose.words import listed, name_of, quantity
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Term
 
@@ -92,7 +92,7 @@ def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = 
     if sure.any():
         at = int(np.argmax(np.where(sure, np.abs(r.f), -1.0)))
         there = ", ".join(f"{v:.4g} {COORDINATES[n].unit}" for n, v in zip(r.depends_on, r.x[at], strict=True))
-        text += f"; {quantity(float(r.f[at]), mechanism.unit, change=True)} at {there}"
+        text += f"; {_size(mechanism, float(r.f[at]))} at {there}"
     text += ")."
     for alike in ([m.title for m in instead], [f"one that goes with {_title(n)}" for n in r.proxies]):
         text += f" It cannot be distinguished from {listed(alike)} here." if alike else ""
@@ -100,9 +100,17 @@ def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = 
     if {"t", "position"} & set(r.depends_on) and not r.manner.startswith(("in waves", "for ")):
         text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."
     if r.nearest is not None:
-        same = "looks nearly the same" if r.cosine >= ALIKE else "is the nearest known effect"
-        text += f" {r.nearest} {same} (similarity {r.cosine:.2f} of 1)."
+        same = "looks nearly the same" if r.cosine >= ALIKE else "is nearest"
+        known, _, where = r.nearest.partition("@")
+        text += f" Of known effects, {name_of(known, where or None)} {same} (similarity {r.cosine:.2f} of 1)."
     return text
+
+
+def _size(mechanism: Mechanism, f: float) -> str:
+    """`-6.2%` of what it is, `501 N against the motion`."""
+    if mechanism.name == "force":
+        return f"{quantity(abs(f), mechanism.unit)} {'against' if f > 0.0 else 'with'} the motion"
+    return f"{100.0 * f:+.3g}%" if mechanism.unit == "-" else quantity(f, mechanism.unit, change=True)
 
 
 def short_form(remainder: Remainder) -> str:

@@ -44,6 +44,7 @@ def test_a_force_that_comes_and_goes(rise):
         assert (begin, end) == (pytest.approx(95.3, abs=2.0), pytest.approx(161.7, abs=2.0))
         assert f"Unexplained: a force on the car {r.manner} (probability" in r.sentence
         assert short_form(r) == f"a force on the car {r.manner}"
+        assert re.search(r"; 2\d\d N against the motion at \d+\.?\d* s\)", r.sentence)
         assert "Without a second pass" in r.sentence
 
 

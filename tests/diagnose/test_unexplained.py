@@ -1,5 +1,6 @@
 """Unknown forms: found in a drive through the competition, described as functions, taken into a model as terms."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -362,6 +363,7 @@ def test_an_axle_is_not_stated_surely_where_only_their_difference_is_known():
     assert r.probability < 0.7 < unexplained.MOST
     other = {"slip_f": "rear", "slip_r": "front"}[r.mechanism]
     assert f"cannot be distinguished from the slip slope of the {other} axle" in r.sentence
+    assert re.search(r"; [+-]\d+\.?\d*% at ", r.sentence)
 
 
 def test_a_change_is_certain_where_the_mean_is_not():
