@@ -10,6 +10,7 @@ import polars as pl
 import pytest
 
 from aqualog.core.errors import ConfigError, SignalError
+from aqualog.core.provenance import Provenance
 from aqualog.diagnose import arena, run, search
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.records import Remainder
@@ -359,6 +360,16 @@ def test_half_of_the_slip_slope_is_named_though_a_straight_line_leaves_nothing_o
         d = told(term("slip_stiffness", "r", gain=hidden), model=Model((term("slip_stiffness", "r", gain=known),)))
         found = {c.key: c.parameters["gain"].value for c in d.causes}
         assert found == {"slip_stiffness@r": pytest.approx(hidden, abs=0.05)}
+
+
+def test_half_of_the_slip_slope_is_more_than_a_file_of_8_percent_leaves_open(monkeypatch):
+    """Six deviations of the file; slopes at the found value would bring the file to half of that."""
+    ask(monkeypatch, [f"slip_stiffness@{at}" for at in ("rl", "rr", "r")])
+    source = {**CAR.provenance, "tyre.slip_slope_r": Provenance("calibrated", 0.08 * CAR.slip_slope_r)}
+    for gain, verdict in ((0.55, "named"), (0.64, "cannot_tell")):
+        log = noisy(term("slip_stiffness", "r", gain=gain))
+        d = diagnose([("a", log)], replace(CAR, provenance=source), options=QUICK)
+        assert (d.verdict, keys(d)) == (verdict, {"slip_stiffness@r"})
 
 
 def test_a_late_velocity_is_named_without_one_of_the_wheels(monkeypatch):
