@@ -35,6 +35,11 @@ def test_close_sets_are_listed_until_they_hold_the_posterior():
     assert sum(q for _, q in found.rivals) == pytest.approx(1.0)
 
 
+def test_the_most_probable_cause_comes_first():
+    found = verdict([([cause("drag"), cause("slope")], 0.0), ([cause("slope")], -0.5), ([cause("gain")], -1.5)])
+    assert [c.effect for c in found.causes] == ["slope", "drag", "gain"]
+
+
 def test_one_effect_at_two_places_is_listed_at_both():
     found = verdict([([cause("drag", "f"), cause("drag", "r")], 0.0), ([cause("slope")], -1.0), ([], -40.0)])
     assert [c.key for c in found.causes] == ["drag@f", "drag@r", "slope"]
