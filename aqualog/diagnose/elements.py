@@ -24,6 +24,7 @@ from aqualog.diagnose.shapes import MECHANISMS, Mechanism, Shape
 from aqualog.diagnose.spline import POINTS, Basis
 from aqualog.diagnose.steps import EDGES, against, clipped, gain_of, intervals, trapezoid
 from aqualog.diagnose.threads import beside
+from aqualog.diagnose.words import listed
 
 __all__ = ["with_elements"]
 
@@ -122,7 +123,7 @@ def _stepped(t: FloatArray, edges: Sequence[tuple[int, int, int]]) -> _Found:
         inside = f"from {begin} to {end}" if low > 0 else f"until {end}"
         said.append(inside if high < t.size else f"from {begin} on")
     kind = "interval" if len(edges) == 1 else "intervals"
-    return _Found(kind, " and ".join(said), basis, (0.5 * EDGES**2) ** len(edges))
+    return _Found(kind, listed(said), basis, (0.5 * EDGES**2) ** len(edges))
 
 
 def _patches(name: str, x: FloatArray, weights: FloatArray, scores: FloatArray) -> list[_Found | None]:
