@@ -401,7 +401,7 @@ def children_of(number):
 
 @pytest.mark.parametrize("delay_s", [0.15, *(pytest.param(s, marks=pytest.mark.nightly) for s in (0.0, 0.4))])
 def test_an_interrupt_while_processes_start_is_one_line(tmp_path, delay_s):
-    campaign = make_campaign(tmp_path, speeds=(70, 80), repeats=6)
+    campaign = make_campaign(tmp_path, speeds=(70, 80), repeats=24)
     command = [sys.executable, "-m", "aqualog", "batch", str(campaign), "--jobs", "2", "--progress", "plain"]
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, start_new_session=True
@@ -420,7 +420,7 @@ def test_an_interrupt_while_processes_start_is_one_line(tmp_path, delay_s):
     assert code == 130
     assert "Traceback" not in error
     assert "interrupted" in error
-    assert run_batch(configure(campaign), store_in(tmp_path)).done == 12
+    assert run_batch(configure(campaign), store_in(tmp_path)).done == 48
 
 
 def test_no_result_goes_into_a_store(own):
