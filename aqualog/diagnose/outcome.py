@@ -77,9 +77,10 @@ def _is_bounded(cause: Cause) -> bool:
 
 
 def _is_absent(cause: Cause) -> bool:
-    """Whether a value stands at a bound that means no effect: a trailer of no mass is drag alone."""
-    own = ((p, cause.parameters.get(p.name)) for p in EFFECTS[cause.effect].parameters)
-    return any(e is not None and e.value == p.neutral and p.neutral in (p.low, p.high) for p, e in own)
+    """Whether a fitted value stands at a bound that means no effect: a trailer of no mass is drag alone."""
+    effect = EFFECTS[cause.effect]
+    fitted = ((p, cause.parameters.get(p.name)) for p in effect.parameters[: effect.drive.count])
+    return any(e is not None and e.value == p.neutral and p.neutral in (p.low, p.high) for p, e in fitted)
 
 
 def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) -> Candidate[Option]:

@@ -98,6 +98,8 @@ def test_a_trailer_of_no_mass_is_drag_alone(monkeypatch):
     monkeypatch.setattr(outcome, "_linear", lambda *_: ((Cause("trailer", None, own, (), "."), True),))
     found = told(option(aero_drag=0.4), Option((0,), SURE))
     assert (found.verdict, names(found)) == ("named", ["aero_drag"])
+    loss = {"radius": Estimate(0.01, 0.0, 0.02, "-"), "start": Estimate(0.0, math.nan, math.nan, "s")}
+    assert not outcome._is_absent(Cause("pressure_loss", "fl", loss, (), "."))  # it begins with the log
 
 
 def test_one_set_of_two_is_compound():
