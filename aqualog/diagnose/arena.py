@@ -119,9 +119,11 @@ class Arena(Field):
         rows = np.empty((self.sd.size + 1, width), dtype=np.float32)
         rows[:k] = turned(p.signatures)
         rows[:k] *= self.sd[:k, None].astype(np.float32)
-        for b in self.blocks:
-            if b.kind != "effect":
-                rows[list(b.columns)] = turned(self.drawn(part, b))
+
+        def fill(b: Block) -> None:
+            rows[list(b.columns)] = turned(self.drawn(part, b))
+
+        beside(fill, [b for b in self.blocks if b.kind != "effect"])
         rows[-1] = turned(p.residual[None])[0]
         return products(rows)
 

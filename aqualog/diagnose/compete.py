@@ -111,13 +111,14 @@ def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -
         tried = beside(lambda s: begun.after(*s), [*coloured, *white])
         # white noise is wrong: a second step is fairer
         likeliest = max(tried[len(coloured) :], key=lambda n: n.likely)
-        tried += [begun.after(likeliest.members, likeliest.fit, number)]
+        second = begun.after(likeliest.members, likeliest.fit, number)
+        tried += [second]
         tried = [n for n in tried if n.is_consistent]
         better = max(tried, key=lambda n: n.likely, default=noise)
         bare = max([bare, *(n.bare for n in tried)])
         if better.likely <= noise.likely:
             break
-        again = begun.after(better.members, better.fit, number)
+        again = second if better is likeliest else begun.after(better.members, better.fit, number)
         noise = again if again.is_consistent and again.likely > better.likely else better
         gram = arena.inner(noise.weighings)
     forms = any(b.kind == "shape" for b in arena.blocks)

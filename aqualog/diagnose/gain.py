@@ -17,6 +17,7 @@ from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.hypotheses import residual
 from aqualog.diagnose.noise import Noise, bridged, for_mask, whitened
 from aqualog.diagnose.records import ChannelGain, Consequence, Gain
+from aqualog.diagnose.threads import beside
 from aqualog.model.follow import follow
 from aqualog.model.term import Model
 
@@ -61,13 +62,13 @@ def measured_gain(
     """
     masks, names = [d.mask for d in drives], tuple(d.name for d in drives)
     # each model has its own target speed with which it meets the measured speed
-    x, alone, y = ([residual(led_by(d, m), m) for d in drives] for m in models)
+    x, alone, y = beside(lambda m: [residual(led_by(d, m), m) for d in drives], models)
     channels = [
         ChannelGain(name, CHANNELS[name].unit, *rms_of_both([r[i] for r in x], [r[i] for r in y], masks))
         for i, name in enumerate(drives[0].channels)
     ]
     if not drives[0].untorqued:
-        then, now = ([_free_speed(d, m) for d in drives] for m in models[::2])
+        then, now = beside(lambda m: [_free_speed(d, m) for d in drives], models[::2])
         channels.append(ChannelGain(SPEED, "m/s", math.nan, math.nan, *rms_of_both(then, now, masks)))
 
     def unit(residuals: list[FloatArray]) -> list[FloatArray]:

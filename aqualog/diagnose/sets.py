@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.diagnose.competition import SCALES, Block, Packed, State, added, joined, packed, scores
+from aqualog.diagnose.competition import SCALES, Block, Packed, State, added, joined, packed, placed, scores
 
 __all__ = [
     "Fitted", "MayJoin", "Members", "Sets", "evidence_of", "first_of", "fitted_in", "ranked",
@@ -56,13 +56,13 @@ class Fitted:
 def fitted_in(blocks: Sequence[Block], inner: FloatArray, members: Sequence[int]) -> Fitted:
     """Values of all columns of a set together, from inner products (K + 1, K + 1) whose last row is the residual."""
     columns = [c for m in members for c in blocks[m].columns]
-    P, at = np.zeros((len(columns), len(columns))), 0
-    for m, s in zip(members, joined(inner, blocks, members).scales, strict=True):
-        own = slice(at, at + len(blocks[m].columns))
-        P[own, own] = s * s * blocks[m].prior
-        at = own.stop
-    cov = np.linalg.inv(np.linalg.inv(P) + inner[np.ix_(columns, columns)])
-    return Fitted(columns, cov @ inner[columns, -1], 0.5 * (cov + cov.T))
+    inner = inner[np.ix_([*columns, -1], [*columns, -1])]
+    own = placed([blocks[m] for m in members])
+    P = np.zeros((len(columns), len(columns)))
+    for b, s in zip(own, joined(inner, own, range(len(own))).scales, strict=True):
+        P[np.ix_(b.columns, b.columns)] = s * s * b.prior
+    cov = np.linalg.inv(np.linalg.inv(P) + inner[:-1, :-1])
+    return Fitted(columns, cov @ inner[:-1, -1], 0.5 * (cov + cov.T))
 
 
 def evidence_of(blocks: Sequence[Block], inner: FloatArray, members: Sequence[int]) -> float:

@@ -40,6 +40,8 @@ def compatible(evidence: Evidence, members: Sequence[int]) -> bool:
     and one of all but one signal is that signal's own, with the other sign. Those of turning are apart from the others.
     """
     own = [evidence.asked[m] for m in members]
+    if len({h.effect.name for h in own}) == len(own):
+        return True
     for effect, drive in {(h.effect.name, h.drive) for h in own if h.effect.drive.is_relative}:
         late = {h.where for h in own if h.effect.name == effect and h.drive in ("", drive)}
         every = {h.where for h in evidence.asked if h.effect.name == effect}

@@ -366,7 +366,7 @@ _ALL = [
     Effect(
         "load_sensitivity", "slip slope over load [-]", "The slip slope{at} follows the load by {delta:+.2f} more.",
         "0.22 in MF6.1 (V, [besselink2010])",
-        (Parameter("delta", "-", 0.0, 0.2, -2.0, 2.0, 0.1, "on the tyre's own"),),
+        (Parameter("delta", "-", 0.0, 0.2, -2.0, 2.0, 0.1, "on top of the tyre's, of slope over load"),),
         _plus(load_sensitivity="delta"),
         _WHEEL_PLACES,
         drive=DriveSearch((_TORQUE, _SPEEDS), tolerance=0.25, doubt=_CURVE),

@@ -85,7 +85,7 @@ def test_a_mixture_of_laws_is_between_them():
     q, t = own_pass(12, "rwd"), emissions_of("rwd")
     p, x, k = params(q.vehicle, q.dt), inputs_of(q.columns, q.vehicle, q.dt), round((q.wet[0] + 2.0) / q.dt)
     each = [t._replace(law=law) for law in (t.law, *0.5 * np.repeat(np.eye(3), 2, axis=1))]
-    each.insert(1, t._replace(ways=t.ways[::-1]))
+    each.insert(1, t._replace(ways=t.ways[::-1].copy()))  # as rows of another order, the recursion is compiled again
     mixed, rare, *alone = (scan(p, own, Filter.new(p, own), x)[0][-1, k] for own in each)
     assert min(alone) + 0.5 < mixed < max(alone) - 0.5
     assert abs(rare - mixed) > 0.2  # how rare each way is counts
