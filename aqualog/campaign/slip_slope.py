@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from aqualog.campaign.bins import DEPTH_KEYS, NO_DRIVETRAIN, Cell, Group, Picked, Plan, Pool, cells, driven_of
-from aqualog.campaign.delay import Delay, Source, delays, source_of
+from aqualog.campaign.delay import Delay, Source, delays, late_slip, source_of
 from aqualog.campaign.expected import LINEAR, Expected, contact_of, expected_of_runs, friction_of, tangent_of
 from aqualog.campaign.results import SETTLING_S, CampaignData, RunInfo, RunSamples
 from aqualog.core.intervals import NOWHERE, Interval
@@ -155,7 +155,10 @@ def slip_slopes(data: CampaignData, plan: Plan, *, robust: bool = False, limits:
             "the wheel spins": np.searchsorted(spun, t + SETTLING_S) > np.searchsorted(spun, t - SETTLING_S),
             f"traction beyond {WIND_UP:g}": np.abs(mu) > WIND_UP,
         }
-        u = samples.array("a_over_v") if source_of(info) in late else np.zeros_like(slip)
+        u = np.zeros_like(slip)
+        if (own := late.get(source_of(info))) is not None:
+            added, u = late_slip(samples, own.value if own.told else 0.0)
+            slip = slip - added
         return Picked({"v_x": samples.array("v_x"), "slip": slip, "mu": mu, "u": u}, without)
 
     def of(road: str, keys: tuple[str, ...], without: Counter[str], *, by_speed: bool) -> list[SlopeRow]:
@@ -204,9 +207,10 @@ def _row(cell: Cell, late: Mapping[Source, Delay], limits: Limits, *, robust: bo
 def fit_slope(
     bare: SlopeRow, pool: Pool, late: Sequence[Delay | None], limits: Limits = LIMITS, *, robust: bool = False
 ) -> SlopeRow:
-    """Fill in the slope of a row, which has counts, from a pool with columns `mu`, `slip`, `u` (a / v) and `v_x`.
+    """Fill in the slope of a row, which has counts, from a pool with columns `mu`, `slip`, `u` and `v_x`.
 
-    `late`: delay of v_x in each run, in order; None: the slip is not against v_x.
+    `late`: delay of v_x in each run, in order, which is taken off the slip already; None: the slip is not against v_x.
+    `u`: change of the slip with that delay, a / v.
     """
     mu, slip, u = (pool.columns[n] for n in ("mu", "slip", "u"))
     if mu.size < limits.samples:
@@ -216,11 +220,8 @@ def fit_slope(
             bare, reason=f"the traction varies by {bare.mu_range[1] - bare.mu_range[0]:.3f} only (5 to 95 %), at least "
             f"{limits.mu_range:g} needed",
         )  # fmt: skip
-    tau = np.array([d.value if d is not None and d.told else 0.0 for d in late])
     half_tau = max((d.half for d in late if d is not None and d.told), default=0.0)
     is_open = any(d is not None and not d.told for d in late)
-    place = np.searchsorted(np.unique(pool.run), pool.run)
-    slip = slip - tau[place] * u
     columns, scatters, noisy = [mu, np.ones_like(mu)], [True, True], [True, False]
     if is_open and np.ptp(u) > 0.0:
         columns, scatters, noisy = [*columns, u], [*scatters, False], [*noisy, False]

@@ -57,7 +57,7 @@ _ALL = [
     Key("", "torque_split_rear", "-", 0.5, 0.0, 1.0, "rear share of drive torque", "1 rwd, 0 fwd, 0.5 awd"),
     Key("", "torque_gain", "-", 1.0, 0.1, 100.0, "torque at the wheels over the one that the log says", "none"),
     Key(
-        "", "driveline_inertia", "kg*m^2", 0.0, 0.0, 100.0, "engine or motor and gears, of the whole car, at the driven wheels",
+        "", "driveline_inertia", "kg*m^2", 0.0, 0.0, 100.0, "engine or motor and gears, at all driven wheels",
         "0: torque at the half shafts; engine 1-3, electric axle 3-6 (K)",
     ),
     Key("", "steering_ratio", "-", 15.0, 5.0, 40.0, "steering wheel angle over road-wheel angle", _MID),

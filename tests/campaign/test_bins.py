@@ -148,6 +148,23 @@ def test_a_late_velocity_is_found_and_taken_off(worn):
     assert biased.slope < 0.75 * in_time.slope
 
 
+@pytest.mark.parametrize("tau", [0.25, -0.25])
+def test_a_late_velocity_is_found_where_the_acceleration_changes_its_sign(tau):
+    turning = Made(grid(WORN))
+    for k, samples in turning._samples.items():
+        t, f = samples.t, samples.frame
+        fine = np.arange(-2.0, 14.0, 1e-3)
+        v = 20.0 + np.cumsum(0.9e-3 * np.sign(np.sin(2.0 * np.pi * (fine + 0.1 * k) / 6.0)))
+        v = np.convolve(v, np.ones(300) / 300.0, "same")  # slips are means over 0.3 s
+        now, a = np.interp(t, fine, v), np.interp(t, fine, np.gradient(v, fine))
+        gained = (now - np.interp(t - tau, fine, v)) / now
+        slips = [pl.Series(f"slip_{w}", f[f"slip_{w}"].to_numpy() + gained) for w in WHEELS]
+        f = f.with_columns(pl.Series("v_x", now), pl.Series("a_over_v", a / now), *slips)
+        turning._samples[k] = RunSamples(f, t, samples.on_water)
+    (found,) = delays(turning).values()
+    assert found.value == pytest.approx(tau, abs=0.003)  # a tau for the speed gained in tau would say 0.23
+
+
 def test_a_delay_that_the_driving_cannot_tell_stays_open():
     constant = Made(grid(WORN, accelerations=(0.0,)), tau=0.1)
     (found,) = delays(constant).values()

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aqualog.campaign.bins import KMH, Plan, group_of
+from aqualog.campaign.delay import late_slip
 from aqualog.campaign.results import RunInfo
 from aqualog.campaign.slip_slope import SlopeRow, SlopeTable, at_zero_slip, slip_slopes
 from aqualog.report.theme import MUTED, wheel_colour
@@ -172,7 +173,7 @@ def _cloud(evidence: Evidence, found: Slopes, row: SlopeRow, *, is_wet: bool) ->
             here &= (v >= row.low_kmh) & (v < row.high_kmh)
         slip = samples.array(f"slip_{row.wheel}")
         if info.about.get("slip_against") == "v_x":
-            slip = slip - late.get(info.run.vehicle.stem, 0.0) * samples.array("a_over_v")
+            slip = slip - late_slip(samples, late.get(info.run.vehicle.stem, 0.0)).slip
         mu = samples.array(f"mu_{row.wheel}")
         good = here & np.isfinite(slip + mu) & (np.abs(slip) < 0.05)
         s.append(100.0 * slip[good])
