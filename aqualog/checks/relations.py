@@ -15,6 +15,7 @@ __all__ = ["Relation", "changes", "relate"]
 LEVEL_S = 5.0  # [s] what changes more slowly is left out: grade, bank, wind, offsets and radii do
 BLOCK_S = 2.5  # [s] beyond, changes have little to do with each other
 LEAST_BLOCKS = 12
+FEW = 3.0  # blocks that weigh as much as a third of the least number may be one event, as water on one side
 DOUBT = 1e-4  # chance that the sign of a relation is wrong
 
 
@@ -71,6 +72,8 @@ def relate(x: FloatArray, y: FloatArray, step_s: float, *, least: float, blocks:
     x, y = x[good], y[good]
     xx, yy, xy = (np.bincount(block, weights=p) for p in (x * x, y * y, x * y))
     if xx.size < blocks or min(xx.sum(), yy.sum()) < least**2 * x.size:
+        return NO_RELATION
+    if (xy**2).sum() * blocks > FEW * np.abs(xy).sum() ** 2:
         return NO_RELATION
     r = float(xy.sum() / math.sqrt(xx.sum() * yy.sum()))
     with np.errstate(invalid="ignore", divide="ignore"):

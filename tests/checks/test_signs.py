@@ -37,6 +37,20 @@ def test_a_velocity_against_the_wheels(turned):
     assert "v_x has the opposite sign of the wheels in 100 %" in first.what
 
 
+def test_water_on_one_side_of_a_straight_road_exchanges_nothing():
+    # wheels of one side slip, the car yaws a little, and the driver steers against it: the drive's only event
+    t = np.arange(DRIVE["v_x"].size) * DT
+    noise = np.random.default_rng(4).normal(size=(len(TURNING), t.size))
+    wet = np.clip(np.minimum(t - 20.0, 24.0 - t), 0.0, 1.0)
+    columns = {n: x for n, x in DRIVE.items() if n not in PLACE}
+    columns |= {n: size * wet + size / 20.0 * e for n, size, e in zip(TURNING, (0.25, 0.01, -0.01), noise, strict=True)}
+    columns |= {w: columns["v_x"] / CAR.r_e(w[-2:]) for w in WHEELS}
+    columns["omega_fl"], columns["omega_rl"] = (
+        columns[w] * (1.0 + s * wet) for w, s in (("omega_fl", 0.03), ("omega_rl", -0.03))
+    )
+    assert [r for r in look(signals(columns), CAR) if r.kind in ("sign", "exchange")] == []
+
+
 @pytest.mark.parametrize("turned", ["a_y", "yaw_rate"])
 def test_without_wheels_the_odd_one_of_three_is_turned(turned):
     assert said(drop=WHEELS, turned=(turned,)) == [((turned,), (line(turned),))]
