@@ -1,5 +1,6 @@
 """Chord, contact and speed of full aquaplaning: the brush turned round, honest intervals, events in words."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +8,12 @@ import pytest
 
 from aqualog.campaign import full_speed
 from aqualog.campaign.bins import KMH, Pool
+from aqualog.campaign.delay import Delay
 from aqualog.campaign.expected import LINEAR, contact_of, tangent_of
 from aqualog.campaign.full_speed import EVENTS, FullSpeed, _drawn, _foretold, _from_passes, _from_slopes
 from aqualog.campaign.slip_slope import SlopeRow, _with_dry, contact, fit_slope
 from aqualog.campaign.spin_downs import Pass
+from aqualog.core.intervals import NOWHERE
 from aqualog.physics.tyre_brush import brush_force
 from aqualog.report.campaign.bins import slope_document
 
@@ -195,6 +198,25 @@ def test_a_wide_interval_is_not_reliable_and_says_so():
     assert wide.slope_ci[1] / wide.slope_ci[0] > 3.0
     assert not wide.reliable
     assert "factor of" in wide.reason
+
+
+@pytest.mark.parametrize("road", ["dry", "wet"])
+def test_with_an_unknown_delay_no_slope_on_water_is_reliable(road):
+    """There mu / C(v) and the delay's a / v are alike."""
+    rng = np.random.default_rng(5)
+    run, late = np.repeat(np.arange(5), 80), Delay("car", math.nan, NOWHERE, 5, 400, "too even")
+    v = 25.0 + 6.0 * np.sin(np.arange(run.size) / 17.0)
+    mu = 0.05 + 0.03 * np.sin(np.arange(run.size) / 5.0)
+    slip = mu / (30.0 if road == "dry" else 30.0 * (25.0 / v) ** 3) + 0.1 * mu / v + 1e-5 * rng.normal(size=run.size)
+    bare = SlopeRow((), "rr", road, 80.0, 100.0, 5, run.size, (0.02, 0.08), 25.0)
+    pool = Pool(run, np.arange(run.size), {"mu": mu, "slip": slip, "u": mu / v, "v_x": v})
+    found = fit_slope(bare, pool, [late] * 5)
+    assert found.reliable == (road == "dry")
+    if found.reliable:
+        assert found.slope == pytest.approx(30.0, rel=0.03)
+    else:
+        assert np.isnan(found.slope_ci).all()
+        assert "the delay of v_x is not known" in found.reason
 
 
 def test_a_line_worse_than_a_constant_is_not_reliable():
