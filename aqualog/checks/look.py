@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +21,7 @@ from aqualog.core.vehicle import Vehicle
 
 __all__ = ["Checks", "look"]
 
+IMPOSSIBLE = 0.2  # share of a signal's samples from which its unit or channel is wrong, and not a sample now and then
 _SCALED = ("yaw_rate", "a_y")
 _JUDGED = (14.0, -1.0)  # [m/s], [m/s^2] above which the measure of the resistance means something
 
@@ -44,7 +45,7 @@ class Checks:
 
     def remarks(self, origins: Mapping[str, Origin]) -> tuple[Remark, ...]:
         """Return what does not fit; empty if all fits or too little moved. `origins` name the lines of the map."""
-        return remarks_of(_doubts(self._gather.windows()), origins)
+        return remarks_of([*_impossible(origins.values()), *_doubts(self._gather.windows())], origins)
 
 
 def look(signals: Signals, vehicle: Vehicle) -> tuple[Remark, ...]:
@@ -55,6 +56,15 @@ def look(signals: Signals, vehicle: Vehicle) -> tuple[Remark, ...]:
     checks = Checks(present, vehicle, signals.dt)
     checks.push({s: signals.array(s) for s in present})
     return checks.remarks(signals.origins)
+
+
+def _impossible(origins: Iterable[Origin]) -> Iterator[Doubt]:
+    """Yield signals much of which no car can have: what is left of them is not right either."""
+    for origin in origins:
+        share = origin.out_of_range / max(origin.samples, 1)
+        if share > IMPOSSIBLE:
+            what = f"{100.0 * share:.0f} % of the samples of {origin.symbol} are beyond what a car can have"
+            yield Doubt("channel", (origin.symbol,), what, "check its unit and its channel", value=share)
 
 
 def _doubts(windows: Windows) -> list[Doubt]:

@@ -6,7 +6,11 @@ from dataclasses import replace
 import polars as pl
 import pytest
 
+from aqualog.checks.look import look
+from aqualog.core.records import Origin
 from aqualog.detect.stream import detect_drive
+from tests.checks.made import CAR as MADE
+from tests.checks.made import made, signals
 from tests.drives import CAR, drive
 
 SPEEDS = {"speed_kmh": ((0.0, 70.0), (10, 110.0), (20, 70.0), (30, 120.0), (40, 80.0)), "duration_s": 40.0}
@@ -24,6 +28,13 @@ def notes(car=KNOWN, **changes):
 
 def test_a_sound_drive_has_no_note():
     assert notes() == ()
+
+
+@pytest.mark.parametrize("left_out", [19, 81])
+def test_a_signal_much_of_which_no_car_can_have(left_out):
+    origin = Origin("omega_fl", "w", "a.csv", "rad/s", 20.0, 100, out_of_range=left_out)
+    found = look(signals(made(), origins={"omega_fl": origin}), MADE)
+    assert [(r.kind, r.signals, r.value) for r in found] == [("channel", ("omega_fl",), 0.81)] * (left_out > 20)
 
 
 @pytest.mark.parametrize("factor", [3.6, 1 / 3.6])
