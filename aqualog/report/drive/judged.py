@@ -55,14 +55,19 @@ def level(judgement: Judgement) -> str:
     return ("full" if any(e.severity == "full" for e in wet) else "partial") if wet else "none"
 
 
-def headline(judgement: Judgement, *, doubted: bool = False) -> str:
-    """The verdict in one sentence; `doubted` where inputs do not fit each other."""
+def headline(judgement: Judgement, *, doubted: bool = False, margin: Margin | None = None) -> str:
+    """The verdict in one sentence; `doubted` where inputs do not fit each other.
+
+    Where no wheel is found afloat, a warning of the `margin` belongs to it.
+    """
     if judgement.verdict == "cannot_be_judged":
         return f"Aquaplaning cannot be judged: {missing_words(judgement.missing)}"
     wet = judgement.of("aquaplaning")
     full = sum(e.severity == "full" for e in wet)
     many = counted(len(wet), "episode") + (f", {full} full" if full else "")
     found = f"Aquaplaning: {episode_sentence(wet[0]) if len(wet) == 1 else many}" if wet else "No aquaplaning"
+    if not wet and margin is not None and math.isfinite(margin.warned_s):
+        found += f", but a warning at {margin.warned_s:.1f} s: {_left(margin)} to full aquaplaning"
     return f"{found}; doubtful, check the inputs first" if doubted else found
 
 
@@ -95,9 +100,13 @@ def margin_lines(margin: Margin | None) -> list[str]:
     """`Least distance to full aquaplaning: 14 km/h (8 … 21) at 9.1 s, first warning at 8.4 s`; none without water."""
     if margin is None:
         return []
-    least, low, high = (number(KMH * x, 0) for x in (margin.least, *margin.ci90))
     warned = f", first warning at {margin.warned_s:.1f} s" if math.isfinite(margin.warned_s) else ", no warning"
-    return [f"Least distance to full aquaplaning: {least} km/h ({low} … {high}) at {margin.at_s:.1f} s{warned}"]
+    return [f"Least distance to full aquaplaning: {_left(margin)} at {margin.at_s:.1f} s{warned}"]
+
+
+def _left(margin: Margin) -> str:
+    least, low, high = (number(KMH * x, 0) for x in (margin.least, *margin.ci90))
+    return f"{least} km/h ({low} … {high})"
 
 
 def card_lines(judgement: Judgement, duration_s: float, most: int = 4) -> list[Line]:

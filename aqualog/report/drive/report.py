@@ -98,7 +98,7 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
     folded = {i for e in judgement.of(*FOLDED) for i in e.events} if len(events) > MOST_TEXT else set()
     sections = [
         Section("", [
-            Headline(headline(judgement, doubted=bool(result.checks)), answers),
+            Headline(headline(judgement, doubted=bool(result.checks), margin=result.margin), answers),
             Para(f"{' '.join(judged_by(judgement, signals.duration_s))}\n{result.vehicle_name}: "
                  f"{signals.duration_s:.1f} s at {1e9 / signals.step_ns:g} Hz, {len(signals.symbols)} signals",
                  where="text"),

@@ -15,7 +15,7 @@ import pytest
 
 import aqualog.report
 from aqualog.core.judgement import Episode, Judgement
-from aqualog.core.records import Quality, Unavailable
+from aqualog.core.records import Margin, Quality, Unavailable
 from aqualog.report.drive.judged import judged_by
 from aqualog.report.drive.report import FIRST_EVENTS, MOST_ROWS, drive_page, drive_report, event_cells
 from aqualog.report.page import write_page
@@ -158,6 +158,16 @@ def test_no_episode_says_what_was_judged_and_what_was_not(short):
     assert "Not judged:" in words
     page = drive_page(fake.with_events(short, ()), title="t")
     assert not any(f'id="{table}"' in page for table in ("events", "episodes", "more-episodes"))
+
+
+def test_a_warning_without_an_episode_is_in_the_verdict(short):
+    margin = Margin(15.4 / 3.6, (3.0 / 3.6, 41.8 / 3.6), 42.2, 40.8)
+    warned = drive_report(replace(fake.with_events(short, ()), margin=margin))
+    first = "No aquaplaning, but a warning at 40.8 s: 15 km/h (3 ... 42) to full aquaplaning"
+    assert report_text(warned).splitlines()[0] == first
+    calm = drive_report(replace(fake.with_events(short, ()), margin=replace(margin, warned_s=math.nan)))
+    assert report_text(calm).splitlines()[0] == "No aquaplaning"
+    assert "warning" not in report_text(drive_report(replace(short, margin=margin))).splitlines()[0]
 
 
 def test_lock_ups_are_folded(short):
