@@ -15,6 +15,7 @@ __all__ = ["Looked", "Seen", "longest_gap", "look", "torque_fall"]
 
 _BEFORE_S = 1.0  # [s] over which the highest torque is taken
 _MEAN_S = 0.1  # [s]
+_LATE_S = 0.3  # [s] by which a torque signal may come after the speed
 
 
 class Looked(NamedTuple):
@@ -40,7 +41,10 @@ class Seen(NamedTuple):
 
 
 def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
-    """Check a run by itself: gaps, entry, acceleration, yaw rate, shift, torque."""
+    """Check a run by itself: gaps, entry, acceleration, yaw rate, shift, torque.
+
+    Without a crossing the throttle must stay open on the whole lane, else the highest speed is the driver's.
+    """
     t, dt = signals.array("t"), signals.dt
     t_stop = float(np.interp(run.stop, np.arange(t.size), t))
     until: BoolArray = (t >= run.span[0]) & (t <= t_stop)
@@ -62,6 +66,10 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
         reasons.append(f"the acceleration {where} is not known")
     elif a_x < limits.a_x_least:
         reasons.append(f"the acceleration {where} is {a_x:.2f} m/s²: no full throttle")
+    after: BoolArray = (t > t_stop) & (t <= run.span[1])
+    if not run.is_crossing and after.sum() * dt >= _LATE_S and _acceleration(t, run.v, after) < -limits.a_x_least:
+        highest = 3.6 * float(np.interp(t_stop, t, run.v))
+        reasons.append(f"the speed falls on the lane from {highest:.1f} km/h on: the throttle was let go")
     yaw = mean_over(signals.array("yaw_rate"), _MEAN_S, dt)[until]
     largest = float(np.nanmax(np.abs(yaw))) if np.isfinite(yaw).any() else math.nan
     if largest > limits.yaw_rate:
@@ -73,7 +81,8 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
         notes.append("no gear: shifts are not looked for")
     elif shift:
         reasons.append(f"the gear changes within {limits.shift:g} s of the crossing")
-    fall = torque_fall(mean_over(run.torque, _MEAN_S, dt), until, max(1, round(_BEFORE_S / dt)))
+    driven = until if run.is_crossing else until | (after & (t <= t_stop + _LATE_S))
+    fall = torque_fall(mean_over(run.torque, _MEAN_S, dt), driven, max(1, round(_BEFORE_S / dt)))
     if math.isnan(fall):
         notes.append("no torque of the driven wheels: whether it was cut is not checked")
     elif fall > limits.torque_cut:

@@ -11,6 +11,7 @@ from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.features.smoothing import earlier
 from aqualog.trade.lane import mean_over
+from aqualog.trade.run_checks import longest_gap
 
 __all__ = ["Speeds", "lateness", "references"]
 
@@ -21,6 +22,7 @@ _MEAN_S = 0.5  # [s] of both speeds: noise in the wheel's rate would make the de
 _BLOCK_S = 1.0  # [s] within which errors belong together
 _RATE_LEAST = 0.3  # [m/s²] of the rate's standard deviation: less may be noise
 _LATE_MOST = 0.5  # [s] more is no delay of a receiver
+_GAP_S = 0.1  # [s] a longer gap in v_x is remarked
 _LATE_OPEN = 0.03  # [s] a delay that is less sure is not taken off; as `campaign.delay.HALF_MAX`
 _BRAKES = 2e5  # [Pa] of the brakes, which make the free wheel slip
 APART = 1.0 / 3.6  # [m/s] references that differ by more are remarked
@@ -44,45 +46,63 @@ def references(
 ) -> Speeds:
     """Return the speeds of a run whose driven axle is `axle` and whose driven wheel on the dry side is `dry`.
 
-    `v_x` is the reference if the log has it on nine tenths of the lane, else the free wheel. The radius of that is the
-    vehicle file's; where the file has none, it is learnt from `v_x` before the lane. Against the free wheel shows by
-    how much `v_x` is late, which is taken off.
+    `v_x` is the reference. The free wheel fills its gaps, with the ratio of both that the run shows about them. It
+    stands for the speed where the lane has no `v_x`, by that ratio too, or by its radius where the log has no `v_x`.
+    The radius is the vehicle file's; where the file has none, it is learnt from `v_x` before the lane. Without a free
+    wheel `v_x` is needed on nine tenths of the lane. Against it shows by how much `v_x` is late, which is taken off.
     """
     v_x = signals.array("v_x")
     none = np.full_like(v_x, np.nan)
-    has_v_x = float(np.isfinite(v_x[on_lane]).mean()) >= _SHARE
+    seen = float(np.isfinite(v_x[on_lane]).mean())
     free, radius, note = _free(signals, vehicle, axle, dry, v_x, before)
     has_free = bool(free) and math.isfinite(radius) and (
         float(np.isfinite(signals.array(free)[on_lane]).mean()) >= _SHARE
     )  # fmt: skip
     y = 0.5 * vehicle.track * (1.0 if dry.endswith("l") else -1.0)
     by_wheel = signals.array(free) * radius + np.nan_to_num(signals.array("yaw_rate")) * y if has_free else none
-    if has_v_x:
-        if not has_free:
-            return Speeds(v_x, none, ("v_x", ""), (note or "no free wheel on the dry side checks v_x",))
-        late, unsure = _late(signals, by_wheel, on_lane, before)
+    if has_free and seen > 0.0:
+        known = _known(signals, on_lane, before)
+        late, unsure = _late(v_x, by_wheel, known, signals.dt)
+        gap = longest_gap(v_x, on_lane | before) * signals.dt
+        filled = f"v_x is missing for {gap:.2f} s: the free wheel {free} fills the gap" if gap > _GAP_S else ""
         v_x = earlier(v_x, late if math.isfinite(late) else 0.0, signals.dt)
         apart = float(np.nanmedian(np.abs(v_x - by_wheel)[on_lane]))
-        more = (f"v_x and {free} differ by {3.6 * apart:.1f} km/h on the lane",) if apart > APART else ()
-        notes = tuple(x for x in (note, unsure) if x)
-        return Speeds(v_x, by_wheel, ("v_x", free), (*notes, *more), late)
+        more = f"v_x and {free} differ by {3.6 * apart:.1f} km/h on the lane" if apart > APART else ""
+        own = np.where(np.isfinite(v_x), v_x, _at_ratio(v_x, by_wheel, known, signals.dt))
+        return Speeds(own, by_wheel, ("v_x", free), tuple(x for x in (note, unsure, filled, more) if x), late)
     if has_free:
-        own = f"no v_x on the lane: the speed is that of the free wheel {free}"
-        return Speeds(by_wheel, none, (free, ""), (own, *((note,) if note else ())))
-    what = "there is no speed on the lane: no v_x, and "
+        own = _at_ratio(v_x, by_wheel, _known(signals, on_lane, before), signals.dt)
+        what = f"no v_x on the lane: the speed is that of the free wheel {free}"
+        return Speeds(own, none, (free, ""), (what, *((note,) if note else ())))
+    if seen >= _SHARE:
+        return Speeds(v_x, none, ("v_x", ""), (note or "no free wheel on the dry side checks v_x",))
+    lost = f"v_x is missing on {100.0 * (1.0 - seen):.0f} % of it" if seen else "no v_x"
+    what = f"there is no speed on the lane: {lost}, and "
     if not free:
         return Speeds(none, none, ("", ""), (f"{what}all wheels are driven",))
     lack = note or f"{free} is not in the log"
     return Speeds(none, none, ("", ""), (what + lack,))
 
 
-def _late(signals: Signals, by_wheel: FloatArray, on_lane: BoolArray, before: BoolArray) -> tuple[float, str]:
-    """Return by how much v_x is late against the speed of a free wheel [s], or NaN and a note where that is open."""
+def _known(signals: Signals, on_lane: BoolArray, before: BoolArray) -> BoolArray:
+    """Return the samples from which v_x and the free wheel are compared: to the lane's end, without brakes."""
     places = np.flatnonzero(on_lane | before)
     known: BoolArray = np.zeros_like(on_lane)
     known[max(places[0] - round(_LEARN_S / signals.dt), 0) : places[-1] + 1] = True
-    known &= ~(signals.array("brake_pressure") > _BRAKES)
-    late, sd = lateness(signals.array("v_x"), by_wheel, known, signals.dt)
+    return known & ~(signals.array("brake_pressure") > _BRAKES)
+
+
+def _at_ratio(v_x: FloatArray, by_wheel: FloatArray, known: BoolArray, dt: float) -> FloatArray:
+    """Return the wheel's speed at its ratio to v_x, mean over 0.5 s, linear between; as it is without any v_x. [m/s]"""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = mean_over(np.where(known & (by_wheel > _V_LEAST), v_x / by_wheel, np.nan), _MEAN_S, dt)
+    seen = np.flatnonzero(np.isfinite(ratio))
+    return by_wheel * np.interp(np.arange(ratio.size), seen, ratio[seen]) if seen.size else by_wheel
+
+
+def _late(v_x: FloatArray, by_wheel: FloatArray, known: BoolArray, dt: float) -> tuple[float, str]:
+    """Return by how much v_x is late against the speed of a free wheel [s], or NaN and a note where that is open."""
+    late, sd = lateness(v_x, by_wheel, known, dt)
     if abs(late) - 1.96 * sd > _LATE_MOST:
         return math.nan, f"v_x is late by {late:.1f} s against the free wheel: check the clocks (`aqualog align`)"
     if not 1.96 * sd <= _LATE_OPEN:

@@ -153,7 +153,9 @@ def straight_run(
     yaw_term = _yaw_term(signals, vehicle, speeds.own, side)
     raw, ratio = slip_of(signals.array(f"omega_{wet}"), signals.array(f"omega_{dry}"), yaw_term, before)
     if not math.isfinite(ratio) or before.sum() * dt < 0.5 * limits.dry:
-        what = f"less than {0.5 * limits.dry:g} s of dry road with speed before the lane, {limits.dry:g} s needed"
+        what = (
+            f"less than {0.5 * limits.dry:g} s of dry road with wheel speeds, {limits.dry:g} s needed before the lane"
+        )
         return replace(bare, wet_side=side, reasons=(what,), notes=notes)
     found = _Found(mean_over(raw, limits.slip_mean, dt), on_lane, max(1, round(limits.slip_lasts / dt)))
     levels = {n: found.at(limits.slip if n == "v_15" else s) for n, s in LEVELS.items()}
@@ -161,13 +163,15 @@ def straight_run(
     highest = int(np.argmax(np.where(on_lane & np.isfinite(speeds.own), speeds.own, -np.inf)))
     is_reached = math.isfinite(at)
     stop = at if is_reached else float(highest)
+    wrong = _of_other(found, limits, stop, f"the other driven wheel, on the {_OTHER[side]}")
     torque = np.asarray(np.sum([signals.array(f"torque_{w}") for w in vehicle.driven], axis=0), dtype=np.float64)
     seen = look(signals, Looked(span, raw, speeds.own, stop, is_reached, torque), limits)
     every = max(1, round(1.0 / (_SHOWN_HZ * dt)))
     return StraightRun(
         {n: _read(speeds.own, k) for n, k in levels.items()},
         {n: _read(speeds.other, k) for n, k in levels.items()} if speeds.names[1] else {},
-        *speeds.names, math.nan if is_reached else float(speeds.own[highest]), seen.reasons,
+        *speeds.names, math.nan if is_reached else float(speeds.own[highest]),
+        (*wrong, *seen.reasons),
         (*notes, *speeds.notes, *seen.notes), seen.a_x, seen.yaw_rate, ratio, _read(t, at), side, axle, span,
         (speeds.own[on_lane][::every], found.slip[on_lane][::every]), speeds.late,
     )  # fmt: skip
@@ -233,6 +237,14 @@ class _Found:
         return crossing(self.slip, self.on_lane, level, self.lasts)
 
 
+def _of_other(found: _Found, limits: StraightLimits, stop: float, wheel: str) -> tuple[str, ...]:
+    """Return why a run says nothing of the side in water: the other driven wheel turned faster by the limit first."""
+    until: BoolArray = found.on_lane & (np.arange(found.slip.size) <= stop)
+    if math.isnan(crossing(-found.slip, until, limits.slip / (1.0 + limits.slip), found.lasts)):
+        return ()
+    return (f"{wheel}, slipped by {100 * limits.slip:g} %: was the wrong side declared?",)
+
+
 def _axle(vehicle: Vehicle) -> str:
     if vehicle.drivetrain == "awd":
         return "r" if vehicle.torque_split_rear > 0.5 else "f"
@@ -280,8 +292,12 @@ def _side(
 
 
 def _yaw_term(signals: Signals, vehicle: Vehicle, speed: FloatArray, side: Side) -> FloatArray:
-    """Return yaw_rate track / v, positive where the wet wheel runs outside; 0 without a yaw rate. [-]"""
-    yaw = np.nan_to_num(signals.array("yaw_rate"))
+    """Return yaw_rate track / v, positive where the wet wheel runs outside; 0 without a yaw rate. [-]
+
+    Across a gap the speed is linear: so small a term does not lose a slip.
+    """
+    yaw, known = np.nan_to_num(signals.array("yaw_rate")), np.flatnonzero(np.isfinite(speed))
+    speed = np.interp(np.arange(speed.size), known, speed[known])
     outside = 1.0 if side == "right" else -1.0
     return outside * yaw * vehicle.track / np.maximum(speed, _V_LEAST)
 

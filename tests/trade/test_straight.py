@@ -113,6 +113,15 @@ def broken(name, value, when=slice(None)):
     return {**columns, name: x}
 
 
+def lifted(at, *, late=math.nan, lane_end=14.0):
+    """A run whose driver lifts at a time [s], before 15 %; its torque comes late [s], or is not in the log."""
+    columns = straight(v_15=200.0, lane=(3.0, lane_end))
+    t, v = np.arange(1500) / 100.0, columns["v_x"].copy()
+    falls = np.where(t > at, v[int(100 * at)] - 0.6 * (t - at), v) / v
+    columns |= {k: x * falls for k, x in columns.items() if k.startswith(("omega", "v_x"))}
+    return columns | {f"torque_f{s}": np.where(t > at + late, 20.0, 400.0) * (late / late) for s in "lr"}
+
+
 AT = slice(760, 790)  # 15 % are reached at 5.98 s
 REASONS = {
     "yaw": (lambda: broken("yaw_rate", 0.2, slice(500, 560)), "yaw rate reaches 0.200"),
@@ -134,6 +143,14 @@ REASONS = {
         lambda: {k: x for k, x in straight(v_15=300.0).items() if not k.startswith("water")},
         "the wet side is not known",
     ),
+    "wrong side": (
+        lambda: (
+            straight() | {f"water_depth_{s}": straight(side="right")[f"water_depth_{s}"] for s in ("left", "right")}
+        ),
+        "the other driven wheel, on the left, slipped by 15 %: was the wrong side declared?",
+    ),
+    "lift": (lambda: lifted(8.0), "the speed falls on the lane from 87.4 km/h on: the throttle was let go"),
+    "lift, torque late": (lambda: lifted(8.0, late=0.15, lane_end=8.25), "torque falls by 95 % within a second"),
     "no speed": (lambda: {k: x for k, x in straight().items() if k not in ("v_x", "omega_rr")}, "no speed on the lane"),
 }
 
@@ -144,6 +161,33 @@ def test_a_run_that_is_none_says_why(name):
     (run,) = straight_runs(signals(make(), rate=5.0 if name == "slow log" else 100.0), FWD)
     assert not run.valid
     assert words in "; ".join(run.reasons)
+
+
+def test_a_throttle_that_is_let_go_behind_the_lane_costs_nothing():
+    run = one(lifted(8.0, late=0.1, lane_end=8.05))
+    assert run.valid, run.reasons
+    assert run.v / KMH == pytest.approx(87.44, abs=0.1)
+
+
+GAPS = {"crossing": (583, 613), "long": (540, 640), "early": (400, 450), "after": (650, 750), "before": (210, 310)}
+
+
+@pytest.mark.parametrize("name", GAPS)
+def test_the_free_wheel_fills_a_gap_in_v_x_at_the_ratio_of_the_run(name):
+    first, last = GAPS[name]
+    run = one(broken("v_x", np.nan, slice(first, last)), replace(FWD, r_e_r=0.32))  # 1 % more than it is
+    assert run.valid, run.reasons
+    assert run.reference == "v_x"
+    assert run.v / KMH == pytest.approx(78.0, abs=0.02)
+    assert f"v_x is missing for {(last - first) / 100:.2f} s: the free wheel omega_rr fills the gap" in run.notes
+
+
+def test_a_gap_in_v_x_without_a_free_wheel_costs_no_slip():
+    car = replace(FWD, drivetrain="awd", torque_split_rear=0.4)
+    assert one(broken("v_x", np.nan, slice(400, 450)), car).v / KMH == pytest.approx(78.0, abs=0.02)
+    assert one(broken("v_x", np.nan, slice(590, 610)), car).reasons == ("the speed is missing at the crossing",)
+    lost = one(broken("v_x", np.nan, slice(400, 950)), car).reasons[0]
+    assert lost == "there is no speed on the lane: v_x is missing on 50 % of it, and all wheels are driven"
 
 
 def test_what_is_not_in_the_log_is_a_note():
