@@ -20,7 +20,7 @@ from aqualog.trade.entry import Entry, Kind, Record
 from aqualog.trade.grip import Coefficients, wet_grip_index
 from aqualog.trade.limits import Limits
 from aqualog.trade.logs import Measured
-from aqualog.trade.sets import Summary, away_from_set, summarised
+from aqualog.trade.sets import Summary, expected_in_set, summarised
 from aqualog.trade.straight import StraightRun
 
 __all__ = ["ControlRow", "Options", "SetRow", "TradeTest", "check_control", "entries_of", "evaluated"]
@@ -172,23 +172,20 @@ def _is_control(entries: Sequence[Entry], members: Sequence[int], options: Optio
 
 def _judge_by_set(entries: list[Entry], members: Sequence[int], limits: Limits) -> None:
     """Note in place which runs of a set have an acceleration, and which stops a coefficient, of their own."""
-    values = [_compared(e.found) if (e := entries[i]).found.valid else math.nan for i in members]
-    is_braking = isinstance(entries[members[0]].found, Stop)
-    share = limits.braking.bfc_share if is_braking else limits.straight.a_x_share
-    told, unit = ("the coefficient", "") if is_braking else ("the acceleration before 15 %", " m/s²")
-    why = ": did ABS control the brake?" if is_braking else ""
-    for i, value, is_away in zip(members, values, away_from_set(values, share), strict=True):
-        if is_away:
-            median = float(np.nanmedian(values))
-            reason = (
-                f"{told} is {value:.2f}{unit}, more than {100 * share:g} % from the set's median of {median:.2f}{why}"
-            )
-            entries[i] = replace(entries[i], of_set=(reason,))
-
-
-def _compared(found: Record) -> float:
-    """Return what a run has in common with the others of its set; NaN for a pass."""
-    return found.a_x if isinstance(found, StraightRun) else found.bfc if isinstance(found, Stop) else math.nan
+    found = [entries[i].found for i in members]
+    values = [
+        math.nan if not f.valid or isinstance(f, CurvePass) else f.bfc if isinstance(f, Stop) else f.a_x for f in found
+    ]
+    speeds = [f.v for f in found if isinstance(f, StraightRun)]
+    share = limits.straight.a_x_share if speeds else limits.braking.bfc_share
+    expected = expected_in_set(values, speeds or None)
+    for i, value, own in zip(members, values, expected, strict=True):
+        if not abs(value - own) > share * abs(own):
+            continue
+        far = f"more than {100 * share:g} % from the"
+        stop = f"the coefficient is {value:.2f}, {far} set's median of {own:.2f}: did ABS control the brake?"
+        run = f"the acceleration before 15 % is {value:.2f} m/s², {far} {own:.2f} m/s² of its set at this speed"
+        entries[i] = replace(entries[i], of_set=(*entries[i].of_set, run if speeds else stop))
 
 
 def _summary(entries: Sequence[Entry], options: Options) -> Summary:

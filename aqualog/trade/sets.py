@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aqualog.core.intervals import NOWHERE, Interval
+from aqualog.core.records import FloatArray
 from aqualog.trade.likelihood import censored_mean
 from aqualog.trade.limits import SetLimits
 
-__all__ = ["Summary", "away_from_set", "summarised"]
+__all__ = ["Summary", "expected_in_set", "summarised"]
 
 _LEAST_FOR_MEDIAN = 3  # runs without which no run can be said to differ from the others
+_FALLS = (-2.0, 0.0)  # exponent of the speed in the acceleration of full throttle
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +84,19 @@ def summarised(values: Sequence[float], bounds: Sequence[float], runs: int, limi
     return replace(summary, notes=tuple(notes), is_enough=is_enough)
 
 
-def away_from_set(values: Sequence[float], share: float) -> list[bool]:
-    """Return which values lie further from their median than a share of it; with fewer than three none does.
+def expected_in_set(values: Sequence[float], speeds: Sequence[float] | None = None) -> FloatArray:
+    """Return what the runs of a set let expect of each: their median; with less than three NaN, as none can differ.
 
-    NaN counts neither for the median nor as away.
+    With `speeds` the accelerations of full throttle, which fall with the speed v: v^n about the median, n the median
+    slope between two runs. It lies between 0 (constant force) and -2 (constant power, a quarter of its
+    force against resistances), so that neither equal speeds nor one run away from the others can bend it further.
     """
     x = np.array(values, dtype=np.float64)
-    known = x[np.isfinite(x)]
-    if known.size < _LEAST_FOR_MEDIAN:
-        return [False] * x.size
-    median = float(np.median(known))
-    return [bool(math.isfinite(v) and abs(v - median) > share * abs(median)) for v in x]
+    known = np.isfinite(x)
+    if known.sum() < _LEAST_FOR_MEDIAN:
+        return np.full(x.size, np.nan)
+    v = np.ones(x.size) if speeds is None else np.array(speeds) / np.median(np.array(speeds)[known])
+    first, second = np.triu_indices(int(known.sum()), 1)
+    rise, run = (y[known][second] - y[known][first] for y in (x / np.median(x[known]), v))
+    slope = float(np.clip(np.median(rise[run != 0.0] / run[run != 0.0]), *_FALLS)) if (run != 0.0).any() else 0.0
+    return np.asarray(np.median((x / v**slope)[known]) * v**slope, dtype=np.float64)

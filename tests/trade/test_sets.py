@@ -8,7 +8,7 @@ from scipy import optimize, stats
 
 from aqualog.trade.likelihood import censored_mean, log_upper_tail
 from aqualog.trade.limits import defaults
-from aqualog.trade.sets import away_from_set, summarised
+from aqualog.trade.sets import expected_in_set, summarised
 
 LIMITS = defaults().set
 
@@ -125,7 +125,24 @@ def test_summary_of_one_run_and_of_none():
     assert summarised([0.7] * 6, [], 6, LIMITS).sd == 0.0  # a mean of equal floats is another float
 
 
+def away(values, speeds=None):
+    expected = expected_in_set(values, speeds)
+    return [bool(abs(x - e) > 0.1 * e) for x, e in zip(values, expected, strict=True)]
+
+
 def test_away_from_the_median():
-    assert away_from_set([1.3, 1.31, 1.29, 1.6], 0.1) == [False, False, False, True]
-    assert away_from_set([1.3, 1.6], 0.1) == [False, False]  # which of two is the odd one?
-    assert away_from_set([1.3, math.nan, 1.31, 1.0], 0.1) == [False, False, False, True]
+    assert away([1.3, 1.31, 1.29, 1.6]) == [False, False, False, True]
+    assert away([1.3, 1.6]) == [False, False]  # which of two is the odd one?
+    assert away([1.3, math.nan, 1.31, 1.0]) == [False, False, False, True]
+
+
+def test_accelerations_are_compared_at_like_speed():
+    v = np.array([77.0, 86.0, 86.5, 87.0, 88.0, 85.0])  # the first one ends with a short lane
+    full = 1.3 * (86.0 / v) ** 1.2
+    assert away(full) == [True, *[False] * 5]
+    assert expected_in_set(full, v) == pytest.approx(full, rel=0.01)
+    for k in (0, 3):
+        part = np.where(np.arange(6) == k, 0.75 * full, full)
+        assert away(part, v) == [i == k for i in range(6)]
+    assert expected_in_set([1.3, 1.2, 1.1], [86.0, 86.1, 86.2]) == pytest.approx([1.2028, 1.2, 1.1972], abs=1e-4)
+    assert expected_in_set([1.3, 1.2, 1.1], [86.0, 86.0, 86.0]) == pytest.approx([1.2, 1.2, 1.2])
