@@ -194,7 +194,7 @@ class _Session:
     def _report(self, before: Watched | None, now: Watched) -> None:
         from aqualog.report.trade.watching import damaged, problems, remarks, run_lines, status
 
-        for line in run_lines(now):
+        for line in run_lines(now, before):
             self.say(line)
         if before is not None and before.look.away and not now.look.away:
             self.hear.note("the folder is back")

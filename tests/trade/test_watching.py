@@ -41,7 +41,7 @@ class Track:
     """A folder, its campaign, and a clock of its own."""
 
     def __init__(self, base, plan=("a,Alpha", "b,Alpha", "c,Beta")):
-        self.base, self.logs, self.now, self.measured = base, base / "logs", 0.0, []
+        self.base, self.logs, self.now, self.measured, self.last = base, base / "logs", 0.0, [], None
         self.logs.mkdir()
         (base / "car.toml").write_text(vehicle_toml(FWD), encoding="utf-8")
         (base / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
@@ -75,7 +75,7 @@ class Track:
         lines = []
         while True:
             found = self.watching.step(self.now, self.do)
-            lines += run_lines(found)
+            lines, self.last = lines + run_lines(found, self.last), found
             if not found.new:
                 return lines, found
 
@@ -99,6 +99,22 @@ def test_a_log_is_measured_when_it_has_settled_and_once(track, stock):
     assert track.look(5.0)[0] == []
     assert track.measured == ["a.parquet"]
     assert found.test.valid == 1
+
+
+def test_a_verdict_that_later_runs_change_gets_a_line(track, stock, tmp_path):
+    aq.convert(signals(straight(v_15=74.0, a=1.0)), tmp_path / "part.parquet", FWD)
+    track.settle("a.parquet", (tmp_path / "part.parquet").read_bytes())
+    track.settle("b.parquet", stock[1])
+    track.plan("a,Alpha", "b,Alpha", "c,Alpha")
+    track.watching.reconfigured(CampaignInputs(track.base / "campaign.toml").configured, track.asked()[0])
+    lines, _ = track.settle("c.parquet", stock[2])
+    assert [x.partition(";")[0] for x in lines] == [
+        "c.parquet: 76.0 km/h, valid",
+        "a.parquet: now 74.0 km/h, not valid: the acceleration before 15 % is 1.00 m/s², more than 10 % from the "
+        "1.30 m/s² of its set at this speed",
+    ]
+    assert "Alpha: valid: 2 of 3" in lines[1]
+    assert track.look(5.0)[0] == []
 
 
 def test_a_copy_in_progress_waits_for_its_last_piece(track, stock):

@@ -22,7 +22,7 @@ from aqualog.trade.evaluation import SetRow, TradeTest
 from aqualog.trade.onset import SIGNS
 from aqualog.trade.straight import StraightRun
 
-__all__ = ["headline", "trade_report"]
+__all__ = ["headline", "run_name", "trade_report"]
 
 _TITLES = {
     "straight": ("straight aquaplaning", "speed at which the wet driven wheel turns 15 % faster than the dry one"),
@@ -68,7 +68,7 @@ def trade_report(test: TradeTest) -> Report:
         (group_text(s.group), s.index.sentence) for s in test.sets if s.index is not None and s.index.sentence
     ]
     has_sets = bool(test.valid)
-    invalid = [(_name(e), "; ".join(e.reasons)) for e in test.entries if not e.valid]
+    invalid = [(run_name(e), "; ".join(e.reasons)) for e in test.entries if not e.valid]
     remarks = [(group_text(s.group), note) for s in test.sets if _valid(s) for note in _notes(s)]
     sections = [
         Section("", [Headline(headline(test), [*verdicts, *test.notes])], "verdict", look="verdict open", where="page"),
@@ -98,7 +98,8 @@ def trade_report(test: TradeTest) -> Report:
     return Report(title, meaning, sections, facts, figures, _FOOTER)
 
 
-def _name(e: Entry) -> str:
+def run_name(e: Entry) -> str:
+    """Name of a run: its log, and its number there from the second one on."""
     name = cut(e.log)
     return name if e.number == 1 else f"{name} ({e.number})"
 
@@ -220,7 +221,8 @@ def _runs(test: TradeTest) -> Table:
     else:
         heads += ["entry [km/h]", "a_y dry [m/s²]", "least", "mean"]
     rows = [
-        [Cell(_name(e), key=e.order), group_text(e.group), "yes" if e.valid else "no", *_cells(e)] for e in test.entries
+        [Cell(run_name(e), key=e.order), group_text(e.group), "yes" if e.valid else "no", *_cells(e)]
+        for e in test.entries
     ]
     return Table(heads, rows, "runs", words=(0, 1, 2), is_sortable=True)
 

@@ -11,7 +11,7 @@ from aqualog.core.units import displayed_text
 from aqualog.report.campaign.labels import group_text
 from aqualog.report.page import report_page
 from aqualog.report.sections import Figures, Headline, Lines, Report, Section
-from aqualog.report.trade.sections import trade_report
+from aqualog.report.trade.sections import run_name, trade_report
 from aqualog.report.values import counted
 from aqualog.trade.entry import Entry
 from aqualog.trade.evaluation import SetRow, TradeTest
@@ -25,13 +25,20 @@ _UNITS = {"straight": ("km/h", 1), "braking": ("", 3)}
 _LEFT_OUT = ("limits-section", "unchecked", "failed")
 
 
-def run_lines(watched: Watched) -> list[str]:
-    """A line for each run of the new drive: its value, valid or why not, and the state of its set."""
+def run_lines(watched: Watched, before: Watched | None = None) -> list[str]:
+    """A line for each run of the new drive: its value, valid or why not, and the state of its set.
+
+    A line, too, for each earlier run of which the set now says otherwise than `before`.
+    """
     name = watched.new
     own = [e for e in watched.test.entries if e.log == name]
     lines = [f"{name}: {_value(e, watched.test)}; {_of_set(e, watched)}" for e in own]
     if name and not own and name not in watched.failed:
         lines.append(f"{name}: no run in it")
+    was_valid = {(e.log, e.number): e.valid for e in before.test.entries} if before else {}
+    for e in watched.test.entries:
+        if e.log != name and was_valid.get((e.log, e.number), e.valid) != e.valid:
+            lines.append(f"{run_name(e)}: now {_value(e, watched.test)}; {_of_set(e, watched)}")
     return [displayed_text(x) for x in lines]
 
 
