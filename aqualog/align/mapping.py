@@ -66,7 +66,7 @@ class SourceClock:
 
 @dataclass(frozen=True, slots=True)
 class SignalMap:
-    """A signal map; the empty map accepts canonical names only."""
+    """A signal map; the empty map accepts canonical names only. A drive may lack the signals in `optional`."""
 
     entries: Mapping[str, Entry] = field(default_factory=dict)
     clocks: Mapping[str, SourceClock] = field(default_factory=dict)
@@ -74,6 +74,7 @@ class SignalMap:
     time_unit: str | None = None
     path: str = ""
     csv: Mapping[str, CsvFormat] = field(default_factory=dict)
+    optional: frozenset[str] = frozenset()
 
     @property
     def hint(self) -> str:
@@ -189,12 +190,12 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
         matches = next((m for m in (matching(channels, c) for c in entry.channel) if m), [])
         if len(matches) == 1:
             found[symbol] = (entry, matches[0])
-        elif not matches:
+        elif not matches and symbol not in signal_map.optional:
             missing.append(entry.channel[0])
             if len(missing) > SHOWN:
                 continue
             faults.append(f"{_place(entry)}no channel {_quoted(entry.channel)}{_nearest(entry.channel, channels)}")
-        else:
+        elif matches:
             faults.append(f"{_place(entry)}channel {_quoted(entry.channel)} is ambiguous: {_listed(matches)}")
             doubled += len({m.file for m in matches}) > 1
     for symbol in (*SYMBOLS, *ACCEPTED):

@@ -30,6 +30,7 @@ from aqualog.trade.straight import straight_runs
 __all__ = ["Measured", "Request", "measure_log", "measure_logs", "measure_signals", "names_of_runs"]
 
 _DEPTHS = ("water_depth_left_mm", "water_depth_mm")
+_OPTIONAL = {"straight": frozenset({"v_x"})}  # mapped signals that a log may lack: another one stands in
 _HERE = 4  # for so few logs no processes are started
 
 Report = Callable[[int, int, int], None]
@@ -125,7 +126,8 @@ def measure_log(
     """Read and measure the log of one run; a text is the reason why it gave nothing."""
     try:
         car = with_load(vehicle, run)
-        signals = load_signals(run.logs, vehicle=car, signal_map=signal_map, dbc=dbc)
+        own = replace(signal_map, optional=_OPTIONAL.get(request.kind, frozenset()))
+        signals = load_signals(run.logs, vehicle=car, signal_map=own, dbc=dbc)
         if request.whole_only and signals.quality.truncated:
             why = "; ".join(signals.quality.notes[:1]) or "part of it is missing"
             return f"{run.logs[0].name} is cut ({why}). Try: copy it again"

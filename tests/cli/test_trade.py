@@ -20,7 +20,7 @@ UNITS = {
 
 
 def write(path, columns, rate=100.0):
-    n = len(columns["v_x"])
+    n = len(columns["omega_fl"])
     group = LogGroup("log", {k: (UNITS[k.split("_")[0]], "", np.asarray(x, float)) for k, x in columns.items()}, None)
     t_ns = np.rint(np.arange(n) * 1e9 / rate).astype(np.int64)
     write_log(path, t_ns, [group], suffix=path.suffix, start_ns=1_700_000_000_000_000_000, comment="", written_ns=0)
@@ -100,6 +100,22 @@ def test_logs_without_a_campaign(campaign, tmp_path):
     again = run("test", "straight", *logs, "--vehicle", campaign / "car.toml", "--page", tmp_path / "p.html")
     assert again.exit_code == 2
     assert "--force" in one_error_line(again)
+
+
+def test_a_log_without_the_v_x_of_the_map_is_measured_by_the_free_wheel(tmp_path):
+    columns = straight()
+    del columns["v_x"]
+    write(tmp_path / "a.mf4", columns)
+    (tmp_path / "car.toml").write_text(vehicle_toml(FWD))
+    (tmp_path / "map.toml").write_text('[signals]\nv_x = "GNSS_Speed"\n')
+    own = (tmp_path / "a.mf4", "--vehicle", tmp_path / "car.toml", "--signals", tmp_path / "map.toml", "--json")
+    done = run("test", "straight", *own)
+    assert done.exit_code == 0, done.stderr
+    (found,) = json.loads(done.stdout)["runs"]
+    assert (found["v_15_kmh"], found["reference"]) == (pytest.approx(78.0, abs=0.05), "omega_rr")
+    assert "no v_x on the lane: the speed is that of the free wheel omega_rr" in found["notes"]
+    for needs_it in (("test", "curve"), ("test", "braking"), ("detect",)):
+        assert 'v_x: no channel "GNSS_Speed"' in run(*needs_it, *own).stderr
 
 
 @pytest.mark.parametrize("test", ["straight", "curve", "braking"])
