@@ -21,6 +21,7 @@ from aqualog.trade.grip import Coefficients, wet_grip_index
 from aqualog.trade.limits import Limits
 from aqualog.trade.logs import Measured
 from aqualog.trade.sets import Summary, expected_in_set, summarised
+from aqualog.trade.speeds import DELAY_OPEN, RATIO_OF_SET
 from aqualog.trade.straight import StraightRun
 
 __all__ = ["ControlRow", "Options", "SetRow", "TradeTest", "check_control", "entries_of", "evaluated"]
@@ -155,6 +156,7 @@ def evaluated(entries: Sequence[Entry], options: Options, failed: Mapping[str, s
         groups.setdefault(e.group, []).append(i)
     judged = list(entries)
     for members in groups.values():
+        _take_ratio_of_set(judged, members)
         _judge_by_set(judged, members, options.limits)
     test = TradeTest(options, tuple(judged), (), failed=dict(failed or {}))
     if options.kind == "curve":
@@ -168,6 +170,24 @@ def evaluated(entries: Sequence[Entry], options: Options, failed: Mapping[str, s
 
 def _is_control(entries: Sequence[Entry], members: Sequence[int], options: Options) -> bool:
     return bool(options.control) and all(entries[i].tyre == options.control for i in members)
+
+
+def _take_ratio_of_set(entries: list[Entry], members: Sequence[int]) -> None:
+    """Give in place the free wheel's speed to runs that do not show how late v_x is, at its ratio to v_x in their set.
+
+    The set's other runs show that ratio without their delays. A bound by a late v_x is too low, so it holds.
+    """
+    runs = {i: f for i in members if isinstance(f := entries[i].found, StraightRun) and "v_15" in f.speeds_other}
+    runs = {i: f for i, f in runs.items() if math.isfinite(f.speeds_other["v_15"])}
+    for i, f in runs.items():
+        sure = [g for g in runs.values() if math.isfinite(g.late) and g.other == f.other]
+        if DELAY_OPEN not in f.notes or not sure:
+            continue
+        ratio = float(np.median([g.speeds["v_15"] / g.speeds_other["v_15"] for g in sure]))
+        notes = tuple(RATIO_OF_SET if n == DELAY_OPEN else n for n in f.notes)
+        speeds = {n: v * ratio for n, v in f.speeds_other.items()}
+        own = replace(f, speeds=speeds, speeds_other=f.speeds, reference=f.other, other=f.reference, notes=notes)
+        entries[i] = replace(entries[i], found=own)
 
 
 def _judge_by_set(entries: list[Entry], members: Sequence[int], limits: Limits) -> None:
@@ -185,7 +205,7 @@ def _judge_by_set(entries: list[Entry], members: Sequence[int], limits: Limits) 
         far = f"more than {100 * share:g} % from the"
         stop = f"the coefficient is {value:.2f}, {far} set's median of {own:.2f}: did ABS control the brake?"
         run = f"the acceleration before 15 % is {value:.2f} m/s², {far} {own:.2f} m/s² of its set at this speed"
-        entries[i] = replace(entries[i], of_set=(*entries[i].of_set, run if speeds else stop))
+        entries[i] = replace(entries[i], of_set=(run if speeds else stop,))
 
 
 def _summary(entries: Sequence[Entry], options: Options) -> Summary:

@@ -13,7 +13,7 @@ from aqualog.features.smoothing import earlier
 from aqualog.trade.lane import mean_over
 from aqualog.trade.run_checks import longest_gap
 
-__all__ = ["Speeds", "lateness", "references"]
+__all__ = ["DELAY_OPEN", "RATIO_OF_SET", "Speeds", "lateness", "references"]
 
 _SHARE = 0.9  # of the lane on which a reference must have a value
 _V_LEAST = 3.0  # [m/s] below, no radius is learnt
@@ -25,6 +25,8 @@ _LATE_MOST = 0.5  # [s] more is no delay of a receiver
 _GAP_S = 0.1  # [s] a longer gap in v_x is remarked
 _LATE_OPEN = 0.03  # [s] a delay that is less sure is not taken off; as `campaign.delay.HALF_MAX`
 _BRAKES = 2e5  # [Pa] of the brakes, which make the free wheel slip
+DELAY_OPEN = "the delay of v_x is not known: too even a speed before and on the lane"
+RATIO_OF_SET = "the delay of v_x is not known: the speed is the free wheel's, at its ratio to v_x in the set"
 APART = 1.0 / 3.6  # [m/s] references that differ by more are remarked
 
 
@@ -106,7 +108,7 @@ def _late(v_x: FloatArray, by_wheel: FloatArray, known: BoolArray, dt: float) ->
     if abs(late) - 1.96 * sd > _LATE_MOST:
         return math.nan, f"v_x is late by {late:.1f} s against the free wheel: check the clocks (`aqualog align`)"
     if not 1.96 * sd <= _LATE_OPEN:
-        return math.nan, "the delay of v_x is not known: too even a speed before and on the lane"
+        return math.nan, DELAY_OPEN
     return late, ""
 
 

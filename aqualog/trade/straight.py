@@ -154,16 +154,17 @@ def straight_run(
     raw, ratio = slip_of(signals.array(f"omega_{wet}"), signals.array(f"omega_{dry}"), yaw_term, before)
     if not math.isfinite(ratio) or before.sum() * dt < 0.5 * limits.dry:
         what = (
-            f"less than {0.5 * limits.dry:g} s of dry road with wheel speeds, {limits.dry:g} s needed before the lane"
+            f"less than {0.5 * limits.dry:g} s of dry road with wheel speeds, {limits.dry:g} s before the lane needed"
         )
         return replace(bare, wet_side=side, reasons=(what,), notes=notes)
-    found = _Found(mean_over(raw, limits.slip_mean, dt), on_lane, max(1, round(limits.slip_lasts / dt)))
-    levels = {n: found.at(limits.slip if n == "v_15" else s) for n, s in LEVELS.items()}
+    slip, lasts = mean_over(raw, limits.slip_mean, dt), max(1, round(limits.slip_lasts / dt))
+    levels = {n: crossing(slip, on_lane, limits.slip if n == "v_15" else s, lasts) for n, s in LEVELS.items()}
     at = levels["v_15"]
     highest = int(np.argmax(np.where(on_lane & np.isfinite(speeds.own), speeds.own, -np.inf)))
     is_reached = math.isfinite(at)
     stop = at if is_reached else float(highest)
-    wrong = _of_other(found, limits, stop, f"the other driven wheel, on the {_OTHER[side]}")
+    other = crossing(-slip, on_lane & (np.arange(t.size) <= stop), limits.slip / (1.0 + limits.slip), lasts)
+    wrong = f"the other driven wheel, on the {_OTHER[side]}, slipped by {100 * limits.slip:g} %: wrong side declared?"
     torque = np.asarray(np.sum([signals.array(f"torque_{w}") for w in vehicle.driven], axis=0), dtype=np.float64)
     seen = look(signals, Looked(span, raw, speeds.own, stop, is_reached, torque), limits)
     every = max(1, round(1.0 / (_SHOWN_HZ * dt)))
@@ -171,9 +172,9 @@ def straight_run(
         {n: _read(speeds.own, k) for n, k in levels.items()},
         {n: _read(speeds.other, k) for n, k in levels.items()} if speeds.names[1] else {},
         *speeds.names, math.nan if is_reached else float(speeds.own[highest]),
-        (*wrong, *seen.reasons),
+        (*((wrong,) if math.isfinite(other) else ()), *seen.reasons),
         (*notes, *speeds.notes, *seen.notes), seen.a_x, seen.yaw_rate, ratio, _read(t, at), side, axle, span,
-        (speeds.own[on_lane][::every], found.slip[on_lane][::every]), speeds.late,
+        (speeds.own[on_lane][::every], slip[on_lane][::every]), speeds.late,
     )  # fmt: skip
 
 
@@ -223,26 +224,6 @@ def crossing(slip: FloatArray, on_lane: BoolArray, level: float, lasts: int) -> 
         if high[k : k + lasts].all() and k + lasts <= slip.size:
             return float(k - 1 + (level - slip[k - 1]) / (slip[k] - slip[k - 1]))
     return math.nan
-
-
-@dataclass(frozen=True, slots=True)
-class _Found:
-    """The mean slip of a run over time, and where it crosses a level."""
-
-    slip: FloatArray
-    on_lane: BoolArray
-    lasts: int
-
-    def at(self, level: float) -> float:
-        return crossing(self.slip, self.on_lane, level, self.lasts)
-
-
-def _of_other(found: _Found, limits: StraightLimits, stop: float, wheel: str) -> tuple[str, ...]:
-    """Return why a run says nothing of the side in water: the other driven wheel turned faster by the limit first."""
-    until: BoolArray = found.on_lane & (np.arange(found.slip.size) <= stop)
-    if math.isnan(crossing(-found.slip, until, limits.slip / (1.0 + limits.slip), found.lasts)):
-        return ()
-    return (f"{wheel}, slipped by {100 * limits.slip:g} %: was the wrong side declared?",)
 
 
 def _axle(vehicle: Vehicle) -> str:

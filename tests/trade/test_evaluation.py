@@ -23,6 +23,7 @@ from aqualog.trade.grip import Coefficients
 from aqualog.trade.limits import Limits, defaults, described
 from aqualog.trade.logs import Measured, Request, measure_signals
 from aqualog.trade.onset import Onset
+from aqualog.trade.speeds import DELAY_OPEN
 from aqualog.trade.straight import StraightRun
 from tests.trade import made
 
@@ -75,6 +76,20 @@ def test_a_run_with_another_acceleration_does_not_count():
         ("A", [run(78.0), run(78.4), run(78.2), run(90.0, a_x=1.6)]), limits=Limits.of({"straight.a_x_share": 0.5})
     )
     assert wide.valid == 4
+
+
+def test_a_run_that_does_not_show_how_late_v_x_is_takes_the_ratio_of_its_set():
+    def late(v, by, wheel, notes=()):
+        lag = math.nan if notes else 0.5
+        return replace(run(v), speeds_other={"v_15": by * KMH}, other=wheel, late=lag, notes=notes)
+
+    sure = [late(78.0, 78.78, "omega_rr"), late(78.4, 79.184, "omega_rr"), late(80.0, 84.0, "omega_rl")]
+    unsure = late(75.5, 78.78, "omega_rr", (DELAY_OPEN,))  # 2.5 km/h too low
+    test = straight(("A", [*sure, unsure]), ("B", [unsure]))
+    assert [e.value for e in test.entries] == pytest.approx([78.0, 78.4, 80.0, 78.0, 75.5])
+    assert (test.entries[3].found.reference, test.entries[3].found.other) == ("omega_rr", "v_x")
+    assert "at its ratio to v_x in the set" in test.entries[3].found.notes[0]
+    assert test.entries[4].found.notes == (DELAY_OPEN,)
 
 
 def test_a_stop_that_abs_did_not_control_does_not_count():

@@ -147,7 +147,7 @@ REASONS = {
         lambda: (
             straight() | {f"water_depth_{s}": straight(side="right")[f"water_depth_{s}"] for s in ("left", "right")}
         ),
-        "the other driven wheel, on the left, slipped by 15 %: was the wrong side declared?",
+        "the other driven wheel, on the left, slipped by 15 %: wrong side declared?",
     ),
     "lift": (lambda: lifted(8.0), "the speed falls on the lane from 87.4 km/h on: the throttle was let go"),
     "lift, torque late": (lambda: lifted(8.0, late=0.15, lane_end=8.25), "torque falls by 95 % within a second"),
