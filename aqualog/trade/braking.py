@@ -104,7 +104,7 @@ def stops(
     braked = [s for s in found if (v_from - v_to) / (s.end_s - s.start_s) >= limits.decel_least]
     if not braked:
         a, at = max(((v_from - v_to) / (s.end_s - s.start_s), s.start_s) for s in found)
-        what = f"{none}: it slows down by {a:.1f} m/s² at most (at {at:.1f} s), "
+        what = f"{none}: between these it slows down by {a:.1f} m/s² on average (from {at:.1f} s on), "
         what += f"a stop by {limits.decel_least:g} m/s² or more; --limits with braking.decel_least takes another value"
         return (Stop(v_from, v_to, reasons=(what,)),)
     return tuple(braked)

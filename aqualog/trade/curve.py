@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray, Signals
-from aqualog.trade.lane import NO_LANE, Span, mean_over, spans_of
+from aqualog.trade.lane import Span, mean_over, no_lane, spans_of
 from aqualog.trade.limits import CurveLimits, defaults
 
 __all__ = ["CurvePass", "curve_pass", "curve_passes"]
@@ -75,7 +75,7 @@ def curve_passes(
     """
     spans = spans_of(signals, lane)
     if not spans:
-        return (CurvePass(reasons=(NO_LANE,)),)
+        return (CurvePass(reasons=(no_lane(signals),)),)
     return tuple(curve_pass(signals, span, limits, radius=radius) for span in spans)
 
 

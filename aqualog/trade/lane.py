@@ -9,7 +9,7 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray, Signals
 
-__all__ = ["NO_LANE", "Side", "Span", "depth_of", "mean_over", "spans_of", "tracks_of", "wet_side_of"]
+__all__ = ["Side", "Span", "depth_of", "mean_over", "no_lane", "spans_of", "tracks_of", "wet_side_of"]
 
 Span = tuple[float, float]
 """Begin and end of a stretch from the log's first sample. [s]"""
@@ -23,8 +23,8 @@ SHARE = 0.1  # of the deeper track's water; with less the other track is dry
 WET = 1e-4  # [m] less is a damp road
 
 
-def spans_of(signals: Signals, given: Span | None = None) -> tuple[Span, ...]:
-    """Return the stretches on water, in order of time.
+def spans_of(signals: Signals, given: Span | None = None, least: float = LEAST_S) -> tuple[Span, ...]:
+    """Return the stretches on water that last at least so long [s], in order of time.
 
     `given` is the lane of the campaign; else `on_water` counts, else the depths in the log. Empty without any.
     """
@@ -44,7 +44,13 @@ def spans_of(signals: Signals, given: Span | None = None) -> tuple[Span, ...]:
             spans[-1] = (spans[-1][0], end)
         else:
             spans.append((begin, end))
-    return tuple(s for s in spans if s[1] - s[0] >= LEAST_S)
+    return tuple(s for s in spans if s[1] - s[0] >= least)
+
+
+def no_lane(signals: Signals) -> str:
+    """Return why a drive has no stretch on water: none at all, or one that is too short."""
+    longest = max((b - a for a, b in spans_of(signals, least=0.0)), default=math.nan)
+    return f"the water in the log lasts {longest:.2f} s, a lane at least {LEAST_S:g} s" if longest >= 0.0 else NO_LANE
 
 
 def tracks_of(signals: Signals, span: Span, depths: tuple[float, float] | None = None) -> tuple[float, float] | None:

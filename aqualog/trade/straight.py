@@ -14,7 +14,7 @@ import numpy as np
 from aqualog.core.notation import AXLES
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.trade.lane import NO_LANE, Side, Span, mean_over, spans_of, tracks_of, wet_side_of
+from aqualog.trade.lane import Side, Span, mean_over, no_lane, spans_of, tracks_of, wet_side_of
 from aqualog.trade.limits import StraightLimits, defaults
 from aqualog.trade.run_checks import Looked, look
 from aqualog.trade.speeds import references
@@ -122,7 +122,7 @@ def straight_runs(
     """
     spans = spans_of(signals, lane)
     if not spans:
-        return (StraightRun(reasons=(NO_LANE,)),)
+        return (StraightRun(reasons=(no_lane(signals),)),)
     return tuple(straight_run(signals, vehicle, span, limits, depths=depths) for span in spans)
 
 

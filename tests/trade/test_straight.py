@@ -135,6 +135,7 @@ REASONS = {
     "one wheel": (lambda: {k: x for k, x in straight().items() if k != "omega_fr"}, "omega_fr is not in the log"),
     "slow log": (lambda: {k: x[::20] for k, x in straight().items()}, "at least 10 needed"),
     "no lane": (lambda: {k: x for k, x in straight().items() if "water" not in k}, "no watered lane"),
+    "short lane": (lambda: straight(lane=(3.0, 3.14)), "the water in the log lasts 0.14 s, a lane at least 0.2 s"),
     "no dry wheel": (
         lambda: straight() | {"water_depth_right": np.full(1500, 7e-3), "water_depth_left": np.full(1500, 7e-3)},
         "no side is dry beside a wet one: 7.0 and 7.0 mm",
