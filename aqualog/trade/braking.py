@@ -156,9 +156,7 @@ def _stop(
     temperature = _temperature(signals, (t >= start) & (t <= end), conditions)
     depth, dry = _water(signals, (start, end), conditions, lane)
     at_reference = bfc + limits.temperature * (temperature - limits.temperature_reference)
-    stop = Stop(
-        v_from, v_to, distance, bfc, at_reference, temperature, depth, conditions.texture, start, end,
-    )  # fmt: skip
+    stop = Stop(v_from, v_to, distance, bfc, at_reference, temperature, depth, conditions.texture, start, end)
     reasons = list(_reasons(signals, v, stop, (t >= start) & (t <= end), dt, limits))
     notes = []
     if dry:

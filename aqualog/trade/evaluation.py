@@ -257,9 +257,7 @@ def _of_curves(test: TradeTest, groups: Mapping[Group, Sequence[int]]) -> TradeT
     def summary(members: Sequence[int]) -> CurveSet:
         return curve_set(passes(members), limits, result=options.result, between=between)
 
-    rows = [
-        SetRow(g, tuple(m), _is_control(test.entries, m, options), curve=summary(m)) for g, m in groups.items()
-    ]  # fmt: skip
+    rows = [SetRow(g, tuple(m), _is_control(test.entries, m, options), curve=summary(m)) for g, m in groups.items()]
 
     def made(blocks: Sequence[Sequence[int]]) -> tuple[list[Block], bool]:
         sets = [(b, summary(b)) for b in blocks]

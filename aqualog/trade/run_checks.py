@@ -54,10 +54,8 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
     gap = longest_gap(run.slip, until) * dt
     if gap > limits.lost:
         reasons.append(f"wheel speeds are missing for {gap:.2f} s {where}")
-    if run.is_crossing and t_stop - run.span[0] < limits.entry:
-        reasons.append(
-            f"15 % came {max(t_stop - run.span[0], 0.0):.2f} s after the lane began: the car entered it too fast"
-        )
+    if run.is_crossing and (came := t_stop - run.span[0]) < limits.entry:
+        reasons.append(f"15 % came {max(came, 0.0):.2f} s after the lane began: the car entered it too fast")
     if run.is_crossing and not np.isfinite(run.v[int(run.stop) : int(run.stop) + 2]).all():
         reasons.append("the speed is missing at the crossing")
     begin = max(t_stop - limits.a_x_window, run.span[0] - limits.dry)

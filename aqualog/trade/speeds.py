@@ -51,15 +51,13 @@ def references(
     `v_x` is the reference. The free wheel fills its gaps, with the ratio of both that the run shows about them. It
     stands for the speed where the lane has no `v_x`, by that ratio too, or by its radius where the log has no `v_x`.
     The radius is the vehicle file's; where the file has none, it is learnt from `v_x` before the lane. Without a free
-    wheel `v_x` is needed on nine tenths of the lane. Against it shows by how much `v_x` is late, which is taken off.
+    wheel `v_x` is needed on nine tenths of the lane. With one it shows by how much `v_x` is late, which is taken off.
     """
     v_x = signals.array("v_x")
     none = np.full_like(v_x, np.nan)
     seen = float(np.isfinite(v_x[on_lane]).mean())
     free, radius, note = _free(signals, vehicle, axle, dry, v_x, before)
-    has_free = bool(free) and math.isfinite(radius) and (
-        float(np.isfinite(signals.array(free)[on_lane]).mean()) >= _SHARE
-    )  # fmt: skip
+    has_free = bool(free) and math.isfinite(radius) and np.isfinite(signals.array(free)[on_lane]).mean() >= _SHARE
     y = 0.5 * vehicle.track * (1.0 if dry.endswith("l") else -1.0)
     by_wheel = signals.array(free) * radius + np.nan_to_num(signals.array("yaw_rate")) * y if has_free else none
     if has_free and seen > 0.0:

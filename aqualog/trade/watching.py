@@ -167,9 +167,7 @@ class Watching:
                 found.append(run)
                 continue
             given = self._configured
-            result = do(
-                measure_log, run, given.vehicles[run.vehicle], given.signal_map, given.dbc, self._request
-            )  # fmt: skip
+            result = do(measure_log, run, given.vehicles[run.vehicle], given.signal_map, given.dbc, self._request)
             found.append(
                 CRASHED if isinstance(result, Crashed) else result if isinstance(result, Measured) else str(result)
             )
