@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,8 +29,9 @@ FITTED = ("v_anchor", "contact_exponent")
 """Numbers that the passes of one tyre in one state can show; the others are those of the published figures."""
 
 LEAST_PASSES = 4
-_SCALES = np.exp(np.linspace(math.log(0.6), math.log(1.7), 105))  # v_anchor over the tyre's, steps of 1 %
-_EXPONENTS = np.exp(np.linspace(math.log(1.2), math.log(8.0), 17))
+_SCALES = np.linspace(math.log(0.6), math.log(1.7), 53)  # log of v_anchor over the tyre's, steps of 2 %
+_EXPONENTS = np.linspace(math.log(1.2), math.log(8.0), 17)  # log
+_ROUNDS, _REACH = 4, 4.0  # each about the estimate of the one before: standard deviations, or steps that are longer
 _SCATTERS = (0.01, 0.02, 0.04, 0.08)  # rms of v_full from window to window, relative
 _UNIT = 0.003  # [-] slip below which the scale of slips is even, above it logarithmic
 _SLIP_SD = 0.0008  # [-] of a window's slip: sensors and the dry ratio
@@ -114,6 +116,18 @@ def _pass_fit(w: WetPass) -> PassFit:
     return PassFit(w.name, v, min(lost, default=math.nan), h_w, len(w.windows))
 
 
+_Grid = tuple[FloatArray, FloatArray]
+"""Logarithms of the scale and of the exponent, evenly spaced."""
+
+
+class _Posterior(NamedTuple):
+    """Mean and standard deviation of the logarithms of scale and exponent, (2,) each; mean of the scatter."""
+
+    mean: FloatArray
+    sd: FloatArray
+    scatter: float
+
+
 @dataclass(frozen=True, slots=True)
 class WaterFit:
     """Numbers with intervals, the passes that count and those that do not, and what the passes do not show.
@@ -175,22 +189,24 @@ def fit_water(passes: Sequence[WetPass], vehicle: Vehicle, tyre: Tyre, *, p: flo
             f"{len(used)} of {len(passes)} passes over water can be used" + (f" ({why})" if why else ""),
             expected=f"at least {LEAST_PASSES}, at several speeds up to a wheel that stops",
         )
-    likelihoods = [_likelihood(w.windows, vehicle, tyre, p) for w in used]
-    scatter = int(np.argmax([sum(x[k] for x in likelihoods).max() for k in range(len(_SCATTERS))]))
-    own = np.stack([x[scatter] for x in likelihoods])
-    whole, sd = _posterior(own.sum(axis=0))
-    left = np.array([_posterior(own.sum(axis=0) - one)[0] for one in own])
+    grid, edges = (_SCALES, _EXPONENTS), (False, False)
+    for number in range(_ROUNDS):
+        each = np.stack([_likelihood(w.windows, vehicle, tyre, p, grid) for w in used])
+        total = each.sum(axis=0)
+        whole, sd, scatter = _posterior(total, grid)
+        edges = edges if number else _at_edges(total)
+        left = np.array([_posterior(total - one, grid).mean for one in each])
+        grid = _finer(grid, whole, sd, scatter)
     n = len(used)
     jack = np.sqrt((n - 1.0) / n * ((left - left.mean(axis=0)) ** 2).sum(axis=0))
     half = np.hypot(student_quantile(0.975, n - 1.0) * np.maximum(sd, jack), 1.96 * np.array(_EVEN_SD))
-    edges = _at_edges(own.sum(axis=0))
     logs = whole + np.log([tyre.v_anchor, 1.0])
     parameters = tuple(
         _parameter(name, float(logs[i]), float(half[i]), tyre, at_edge=edges[i]) for i, name in enumerate(FITTED)
     )
     told = tuple(f"{q.name}: {q.why_not}" for q in parameters if not q.identified)
     lost = sum(any(w.is_lost for w in x.windows) for x in used)
-    return WaterFit(parameters, used, left_out, _SCATTERS[scatter], lost, told)
+    return WaterFit(parameters, used, left_out, scatter, lost, told)
 
 
 def _parameter(name: str, log: float, half: float, tyre: Tyre, *, at_edge: bool) -> Parameter:
@@ -205,20 +221,20 @@ def _parameter(name: str, log: float, half: float, tyre: Tyre, *, at_edge: bool)
     return Parameter(name, value, (low, high), key.unit, not why, why, remark, float(getattr(tyre, name)))
 
 
-def _likelihood(windows: Sequence[Window], vehicle: Vehicle, tyre: Tyre, p: float) -> FloatArray:
+def _likelihood(windows: Sequence[Window], vehicle: Vehicle, tyre: Tyre, p: float, grid: _Grid) -> FloatArray:
     """Log-likelihood of a pass over (scatter, scale, exponent)."""
+    log_scale, log_exponent = grid
     table = np.array([w[:5] for w in windows])
     v, h_w, F_z, demand, slip = table.T
     lost = np.array([w.is_lost for w in windows])
     y = np.arcsinh(slip / _UNIT)
     late = np.abs([w.a for w in windows]) * _LATE_S / v
     sd = np.hypot(_RELATIVE_SD * np.abs(slip), np.hypot(_SLIP_SD, late)) / np.hypot(slip, _UNIT)
-    out = np.empty((len(_SCATTERS), _SCALES.size, _EXPONENTS.size))
-    log_scale = np.log(_SCALES)
+    out = np.empty((len(_SCATTERS), log_scale.size, log_exponent.size))
     kernels = [np.exp(-0.5 * ((log_scale[:, None] - log_scale[None]) / s) ** 2) for s in _SCATTERS]
-    for j, n in enumerate(_EXPONENTS):
+    for j, n in enumerate(np.exp(log_exponent)):
         own = replace(tyre, contact_exponent=float(n))
-        s = even_slip(own, vehicle, v, h_w, F_z, p=p, demand=demand, scales=_SCALES)
+        s = even_slip(own, vehicle, v, h_w, F_z, p=p, demand=demand, scales=np.exp(log_scale))
         floats = ~(s <= SPUN)
         z = (np.arcsinh(np.where(floats, -1.0, s) / _UNIT) - y[:, None]) / sd[:, None]
         density = np.where(
@@ -230,21 +246,27 @@ def _likelihood(windows: Sequence[Window], vehicle: Vehicle, tyre: Tyre, p: floa
     return out
 
 
-def _posterior(log_likelihood: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean and standard deviation of the logarithms of scale and exponent, (2,) each."""
+def _posterior(log_likelihood: FloatArray, grid: _Grid) -> _Posterior:
+    """Of a likelihood over (scatter, scale, exponent)."""
     weight = np.exp(log_likelihood - log_likelihood.max())
     weight /= weight.sum()
-    mean, sd = np.empty(2), np.empty(2)
-    for i, (grid, share) in enumerate(((_SCALES, weight.sum(axis=1)), (_EXPONENTS, weight.sum(axis=0)))):
-        x = np.log(grid)
-        mean[i] = share @ x
-        sd[i] = math.sqrt(float(share @ (x - mean[i]) ** 2) + ((x[1] - x[0]) ** 2) / 12.0)
-    return mean, sd
+    shares = weight.sum(axis=(0, 2)), weight.sum(axis=(0, 1))
+    mean = np.array([share @ x for x, share in zip(grid, shares, strict=True)])
+    square = [share @ (x - m) ** 2 + (x[1] - x[0]) ** 2 / 12.0 for x, m, share in zip(grid, mean, shares, strict=True)]
+    return _Posterior(mean, np.sqrt(square), float(weight.sum(axis=(1, 2)) @ _SCATTERS))
+
+
+def _finer(grid: _Grid, mean: FloatArray, sd: FloatArray, scatter: float) -> _Grid:
+    """The same number of values about the estimate: steps of 12 % of the exponent move the scale by 3 %."""
+    beside = (2.5 * scatter, 0.0)  # speeds that scatter into the range
+    ends = [(x[0], x[-1], _REACH * max(s, x[1] - x[0]) + b) for x, s, b in zip(grid, sd, beside, strict=True)]
+    fine = [np.linspace(max(m - r, a), min(m + r, b), x.size) for x, m, (a, b, r) in zip(grid, mean, ends, strict=True)]
+    return fine[0], fine[1]
 
 
 def _at_edges(log_likelihood: FloatArray) -> tuple[bool, bool]:
     """Whether much of the posterior of scale and exponent lies at the end of its range."""
     weight = np.exp(log_likelihood - log_likelihood.max())
     weight /= weight.sum()
-    shares = weight.sum(axis=1), weight.sum(axis=0)
+    shares = weight.sum(axis=(0, 2)), weight.sum(axis=(0, 1))
     return tuple(bool(s[0] + s[-1] > 0.05) for s in shares)  # type: ignore[return-value]
