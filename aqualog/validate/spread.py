@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from statistics import NormalDist
 
 import numpy as np
 
-from aqualog.core.intervals import student_quantile
+from aqualog.core.intervals import Z95, student_quantile
 from aqualog.core.records import FloatArray
+from aqualog.trade.control import satterthwaite
 from aqualog.validate.records import Trace
 
 __all__ = ["LEAST_DRIVES", "spread_of"]
@@ -20,6 +22,7 @@ LEAST_SHARE = 0.5  # of the judged time that must lie in cells of three drives a
 # of drives that repeat each other, else any three would widen the boundaries by what differs between their roads
 LENGTHS = 0.15  # most difference of the lengths
 SPEEDS = 0.1  # most rms difference of the speeds, of their mean
+TOGETHER_S = 1.0  # [s] within which errors belong together: a velocity of 10 Hz is its own neighbour over 0.1 s
 LATE_S = 10.0  # [s] by which one recording may begin later than another
 
 
@@ -36,10 +39,11 @@ def spread_of(traces: Sequence[Trace], signal: str) -> float:
     Returns
     -------
     float
-        t sqrt(s_b² + s_n²) [unit of the signal], t the 97.5 % quantile of Student's t with (drives - 1) degrees of
-        freedom. s_b is the scatter between the drives' means of measured minus simulated in cells of speed (5 km/h),
-        dry and wet apart; what the inputs of a drive explain is not in it, an error that all drives share neither.
-        s_n is the noise, from the differences of successive blocks.
+        t sqrt(s_b² + s_n²) [unit of the signal]. s_b is the scatter between the drives' means of measured minus
+        simulated in cells of speed (5 km/h), dry and wet apart; what the inputs of a drive explain is not in it, an
+        error that all drives share neither. s_n is the noise, from differences over a second, and larger for each other
+        signal: all must be within at once [bonferroni1936]. t is the 97.5 % quantile of Student's t with the degrees of
+        freedom of the sum [satterthwaite1946]: s_b has (drives - 1), s_n one per second.
     """
     if len(traces) < LEAST_DRIVES or any(signal not in t.measured for t in traces) or not _repeat(traces):
         return math.nan
@@ -49,7 +53,8 @@ def spread_of(traces: Sequence[Trace], signal: str) -> float:
         off = np.where(trace.judged, trace.measured[signal] - trace.simulated[signal], np.nan)
         good = np.isfinite(off)
         judged += int(good.sum())
-        step = np.diff(off)
+        late = max(1, round(TOGETHER_S / trace.step))
+        step = off[late:] - off[:-late]
         step = step[np.isfinite(step)]
         squares, pairs = squares + 0.5 * float(step @ step), pairs + step.size
         cell = np.floor(trace.over["v_x"] / CELL).astype(int)
@@ -62,8 +67,12 @@ def spread_of(traces: Sequence[Trace], signal: str) -> float:
     if not shared or sum(n for x in shared for _, n in x) < LEAST_SHARE * judged or not pairs:
         return math.nan
     between = sum(float(np.var([m for m, _ in x])) * len(x) for x in shared) / sum(len(x) - 1 for x in shared)
-    t = student_quantile(0.975, float(len(traces) - 1))
-    return t * math.sqrt(between + squares / pairs)
+    at_once = NormalDist().inv_cdf(1.0 - 0.025 / len(traces[0].measured)) / Z95
+    noise, seconds = at_once**2 * squares / pairs, pairs * traces[0].step / TOGETHER_S
+    if not between + noise:
+        return 0.0
+    dof = satterthwaite((between, noise), (len(traces) - 1, max(seconds, 1.0)))
+    return student_quantile(0.975, dof) * math.sqrt(between + noise)
 
 
 def _repeat(traces: Sequence[Trace]) -> bool:

@@ -128,13 +128,30 @@ def test_spread_of_repetitions():
     # means 0, 0.1, 0.2: standard deviation 0.1, and t(0.975, 2) = 4.303; an error that all share is not in it
     assert spread_of(repeated((0.0, 0.1, 0.2), 0.0), "a_x") == pytest.approx(4.303 * 0.1, rel=1e-3)
     assert spread_of(repeated((5.0, 5.1, 5.2), 0.0), "a_x") == pytest.approx(4.303 * 0.1, rel=1e-3)
-    assert spread_of(repeated((0.0, 0.0, 0.0), 0.05), "a_x") == pytest.approx(4.303 * 0.05, rel=0.1)
     assert math.isnan(spread_of(repeated((0.0, 0.1), 0.0), "a_x"))
     assert math.isnan(spread_of(repeated((0.0, 0.1, 0.2), 0.0), "a_y"))
     elsewhere = [
         replace(t, over={**t.over, "v_x": np.full(500, 20.0 + 5.0 * i)}) for i, t in enumerate(repeated((0, 1, 2), 0))
     ]
     assert math.isnan(spread_of(elsewhere, "a_x"))
+
+
+def test_student_counts_for_what_three_drives_know():
+    """The noise is known from thousands of blocks. One of seven signals has a wider one: all must be within at once."""
+    assert spread_of(repeated((0.0, 0.0, 0.0), 0.05), "a_x") == pytest.approx(1.976 * 0.05, rel=0.05)  # dof 147
+    # variances 0.01 and 0.04: dof = 0.05² / (0.01²/2 + 0.04²/147) = 41, t = 2.02
+    mixed = repeated((0.0, 0.1, 0.2), 0.2)
+    assert spread_of(mixed, "a_x") == pytest.approx(2.02 * math.hypot(0.1, 0.2), rel=0.05)
+    many = [replace(t, measured=dict.fromkeys("abcdef", t.measured["a_x"]) | t.measured) for t in mixed]
+    # 1 - 0.025/7 of the normal distribution is at 2.69; 5 % more dof change nothing
+    assert spread_of(many, "a_x") == pytest.approx(1.99 * math.hypot(0.1, 0.2 * 2.69 / 1.96), rel=0.05)
+
+
+def test_neighbours_of_a_slow_signal_do_not_hide_its_noise():
+    slow = [
+        replace(t, measured={"a_x": np.repeat(t.measured["a_x"][::10], 10)}) for t in repeated((0.0, 0.0, 0.0), 0.05)
+    ]
+    assert spread_of(slow, "a_x") == pytest.approx(1.976 * 0.05, rel=0.15)
 
 
 def test_three_drives_on_other_roads_are_no_repetitions():
