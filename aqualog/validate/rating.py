@@ -27,13 +27,15 @@ SLOPE_SAMPLES = 9
 
 @dataclass(frozen=True, slots=True)
 class Rating:
-    """Corridor Z, phase E_P, magnitude E_M and slope E_S. `shift` [samples]: positive where the simulation is late."""
+    """Corridor Z, phase E_P, magnitude E_M and slope E_S. `shift` [samples]: positive where the simulation is late; the
+    phase goes by it, as in the standard. `late` [samples]: the same between samples."""
 
     corridor: float
     phase: float
     magnitude: float
     slope: float
     shift: int
+    late: float
 
     @property
     def total(self) -> float:
@@ -60,7 +62,7 @@ def rating(reference: FloatArray, simulated: FloatArray) -> Rating:
     """
     if reference.shape != simulated.shape or reference.size < LEAST_SAMPLES:
         raise ValueError(f"{reference.size} and {simulated.size} samples, {LEAST_SAMPLES} of both are needed")
-    shift = _shift(reference, simulated)
+    shift, late = _shift(reference, simulated)
     measured, moved = _overlapping(reference, simulated, shift)
     most = MOST_SHIFT * reference.size
     return Rating(
@@ -69,6 +71,7 @@ def rating(reference: FloatArray, simulated: FloatArray) -> Rating:
         magnitude(measured, moved),
         slope(measured, moved),
         shift,
+        late,
     )
 
 
@@ -80,15 +83,16 @@ def _corridor(reference: FloatArray, simulated: FloatArray) -> float:
     return float((np.clip((OUTER - off) / (OUTER - INNER), 0.0, 1.0) ** 2).mean())
 
 
-def _shift(reference: FloatArray, simulated: FloatArray) -> int:
-    """By how many samples the simulation is late, where the correlation is greatest; of equal ones the smallest."""
-    best, at = _correlation(reference, simulated), 0
-    for k in range(1, int(MOST_SHIFT * reference.size) + 1):
-        for signed in (k, -k):
-            r = _correlation(*_overlapping(reference, simulated, signed))
-            if r > best:
-                best, at = r, signed
-    return at
+def _shift(reference: FloatArray, simulated: FloatArray) -> tuple[int, float]:
+    """By how many samples the simulation is late, where the correlation is greatest (of equal ones the smallest), and
+    the same between samples, by a parabola."""
+    most = int(MOST_SHIFT * reference.size)
+    nearest = sorted(range(-most, most + 1), key=lambda k: (abs(k), -k))
+    r = {k: _correlation(*_overlapping(reference, simulated, k)) for k in nearest}
+    at = max(nearest, key=lambda k: r[k])
+    before, after = (r.get(k, float("nan")) for k in (at - 1, at + 1))
+    bend = before - 2.0 * r[at] + after
+    return at, at + (0.5 * (before - after) / bend if bend < 0.0 else 0.0)
 
 
 def _overlapping(reference: FloatArray, simulated: FloatArray, shift: int) -> tuple[FloatArray, FloatArray]:

@@ -18,8 +18,8 @@ from aqualog.diagnose.drive import Drive, prepare
 from aqualog.diagnose.hypotheses import simulated
 from aqualog.model.term import Model
 from aqualog.validate.boundary import beyond
-from aqualog.validate.rating import LEAST_SAMPLES, Rating, rating
-from aqualog.validate.records import SIGNALS, Judged, Limit, Plan, Plot, Rated, Trace, Validity, Worst
+from aqualog.validate.rating import LEAST_SAMPLES, rating
+from aqualog.validate.records import PLOTS, SIGNALS, Judged, Limit, Plan, Plot, Rated, Trace, Validity, Worst
 from aqualog.validate.spread import LEAST_DRIVES, spread_of
 
 __all__ = ["trace_of", "validate"]
@@ -28,7 +28,7 @@ BINS = 24  # of a plot that is not over time
 LEAST_IN_BIN = 10  # blocks
 BRIDGED_S = 0.5  # [s] shorter stretches within part no stretch beyond
 LONGEST_S = 60.0  # [s] of a rated stretch
-MOVES = 6.0  # times eps_y from the least to the greatest value of a stretch that is rated
+MOVES = 6.0  # times the built-in eps_y from the least to the greatest value of a stretch that is rated
 LEAST_VALID = 1.0 / 3.6  # [m/s] a range of speed that counts as valid, at least; and a fifth of what was driven
 LEAST_BEYOND_S = 2.0  # [s] more than the agreed share allows, before a part of the speeds is not valid
 
@@ -73,7 +73,7 @@ def validate(
     all_in = [_all_within(t, [o[i] for o in off.values()]) for i, t in enumerate(traces)]
     seconds = sum(float(t.judged.sum()) * t.step for t in traces)
     within = sum(float(w[t.judged].sum()) * t.step for t, w in zip(traces, all_in, strict=True))
-    found = [(w, _weight(w, p)) for p, o in off.items() for w in _stretches(p.y, traces, o)]
+    worst = [(j.worst, _weight(j.worst, j.plot)) for j in judged if j.worst is not None]
     notes = [f"{t.name}: {n}" for t in traces for n in t.notes]
     if len(traces) < LEAST_DRIVES:
         notes.append(f"{len(traces)} of the {LEAST_DRIVES} drives that the method asks for at the least")
@@ -83,8 +83,8 @@ def validate(
         )
     return Validity(
         tuple(traces), plan, within / seconds if seconds else math.nan, seconds, sum(t.duration_s for t in traces),
-        judged, max(found, key=lambda x: x[1])[0] if found else None, _limits(traces, all_in, plan.agreed),
-        _rated(traces, plan), spread, tuple(notes),
+        judged, max(worst, key=lambda x: x[1])[0] if worst else None, _limits(traces, all_in, plan.agreed),
+        _rated(traces), spread, tuple(notes),
     )  # fmt: skip
 
 
@@ -151,8 +151,7 @@ def _off(trace: Trace, plot: Plot) -> FloatArray:
 def _over_time(plot: Plot, traces: Sequence[Trace], off: Sequence[FloatArray]) -> Judged:
     every = np.concatenate(off)
     good = np.isfinite(every)
-    found = [(w, _weight(w, plot)) for w in _stretches(plot.y, traces, off)]
-    worst = max(found, key=lambda x: x[1])[0] if found else None
+    worst = max(_stretches(plot.y, traces, off), key=lambda w: _weight(w, plot), default=None)
     seconds = sum(float(np.isfinite(o).sum()) * t.step for t, o in zip(traces, off, strict=True))
     return Judged(plot, int(good.sum()), int((every[good] == 0.0).sum()), seconds, worst)
 
@@ -194,12 +193,8 @@ def _cross(plot: Plot, traces: Sequence[Trace]) -> Judged | None:
     own = [t for t in traces if plot.y in t.measured and plot.x in t.over]
     if not own:
         return None
-    x, measured, shown = (
-        np.concatenate([a[t.judged] for t, a in zip(own, arrays, strict=True)])
-        for arrays in (
-            [t.over[plot.x] for t in own], [t.measured[plot.y] for t in own], [t.simulated[plot.y] for t in own],
-        )
-    )  # fmt: skip
+    three = ([t.over[plot.x] for t in own], [t.measured[plot.y] for t in own], [t.simulated[plot.y] for t in own])
+    x, measured, shown = (np.concatenate([a[t.judged] for t, a in zip(own, x, strict=True)]) for x in three)
     good = np.isfinite(x) & np.isfinite(measured) & np.isfinite(shown)
     x, measured, shown = x[good], measured[good], shown[good]
     if x.size < 2 * LEAST_IN_BIN:
@@ -246,33 +241,27 @@ def _limit(condition: str, v: FloatArray, bad: BoolArray, agreed: float, step: f
     return Limit(condition, float(v[i]), low, high, float(1.0 - bad[i:].mean()), seconds)
 
 
-def _rated(traces: Sequence[Trace], plan: Plan) -> tuple[Rated, ...]:
-    """Ratings of the signals that move: of one that only rustles, phase and slope would be those of its noise."""
+def _rated(traces: Sequence[Trace]) -> tuple[Rated, ...]:
+    """Ratings of the signals that move: of one that only rustles, phase and slope would be those of its noise.
+
+    The measured curve alone says whether it moves: with tolerances of a plan or of repetitions, two models of one car
+    would be rated on different stretches.
+    """
     out = []
-    least = {p.y: MOVES * p.tolerance.y_offset for p in plan.plots if p.x == "t"}
+    least = {p.y: MOVES * p.tolerance.y_offset for p in PLOTS if p.x == "t"}
     for signal in SIGNALS:
-        found: list[tuple[Rating, float]] = []
-        for trace in traces:
-            if signal not in trace.measured:
-                continue
+        found, seconds = [], []
+        for trace in (t for t in traces if signal in t.measured):
             a, b = trace.measured[signal], trace.simulated[signal]
             good = trace.judged & np.isfinite(a) & np.isfinite(b)
             edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int8), [0]])))
             for i, j in _pieces(edges, round(LONGEST_S / trace.step)):
-                if j - i >= LEAST_SAMPLES and np.ptp(a[i:j]) > least.get(signal, 0.0):
+                if j - i >= LEAST_SAMPLES and np.ptp(a[i:j]) > least[signal]:
                     r = rating(a[i:j], b[i:j])
-                    found.append((r, (j - i) * trace.step))
-        total = sum(s for _, s in found)
-        if total:
-            step = traces[0].step
-            mean = [
-                sum(s * x for (_, s), x in zip(found, xs, strict=True)) / total
-                for xs in zip(
-                    *((r.total, r.corridor, r.phase, r.magnitude, r.slope, r.shift * step) for r, _ in found),
-                    strict=True,
-                )
-            ]
-            out.append(Rated(signal, total, *mean))
+                    found.append((r.total, r.corridor, r.phase, r.magnitude, r.slope, r.late * trace.step))
+                    seconds.append((j - i) * trace.step)
+        if found:
+            out.append(Rated(signal, sum(seconds), *np.average(found, axis=0, weights=seconds).tolist()))
     return tuple(out)
 
 

@@ -32,6 +32,14 @@ def test_phase(late):
     assert found.phase == pytest.approx(1.0 - abs(late) / 40.0)  # 20 % of 200 samples are 40
 
 
+@pytest.mark.parametrize("late", [0.4, -0.4, 12.3])
+def test_the_delay_lies_between_samples(late):
+    moved = np.exp(-(((T - 8.0 - 0.1 * late) / 1.5) ** 2))
+    found = rating(PULSE, moved)
+    assert found.late == pytest.approx(late, abs=0.01)
+    assert found.shift == round(late)  # by which the phase goes
+
+
 def test_magnitude_of_a_constant():
     # every pairing is off by 1 of 5: error 0.2, E_M = 1 - 0.2/0.5
     assert magnitude(np.full(50, 5.0), np.full(50, 6.0)) == pytest.approx(0.6)

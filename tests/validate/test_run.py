@@ -13,7 +13,7 @@ from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model
 from aqualog.validate.boundary import Tolerance
-from aqualog.validate.records import PLOTS, Plan, Plot, Trace
+from aqualog.validate.records import PLOTS, SIGNALS, Plan, Plot, Trace
 from aqualog.validate.run import _limit, _pieces, validate
 from aqualog.validate.spread import spread_of
 
@@ -181,6 +181,21 @@ def test_repeated_drives_give_the_tolerance_unless_the_user_does():
     given = judged(*drives, plan=Plan((own, *PLOTS[1:]), given=frozenset({"a_x"})))
     assert "a_x" not in given.spread
     assert given.plan.plots[0] == own
+
+def test_the_measured_curve_says_what_is_rated():
+    """Not the simulation, whose errors widen the boundaries of three drives, nor a file of boundaries."""
+    from aqualog.model.effects import EFFECTS
+    from aqualog.model.term import Term
+
+    drives = [drive(seed) for seed in (1, 2, 3)]
+    wide = Plan(
+        tuple(replace(p, tolerance=Tolerance(0.1, 0.0, 9.0)) for p in PLOTS if p.x == "t"), given=frozenset(SIGNALS)
+    )
+    light = Model((Term(EFFECTS["payload_mass"], {"delta_mass": -400.0}),))
+    every = [judged(*drives), judged(*drives, plan=wide), judged(*drives, model=light)]
+    assert len({tuple((r.signal, r.seconds) for r in x.rated) for x in every}) == 1
+    assert every[0].rated
+
 
 
 def test_long_stretches_are_rated_in_parts():
