@@ -14,12 +14,14 @@ from aqualog.core.errors import SignalError
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import block_means, block_step, channel_values
-from aqualog.diagnose.drive import Drive, prepare
+from aqualog.diagnose.drive import RECOVERY_S, Drive, prepare
 from aqualog.diagnose.hypotheses import simulated
-from aqualog.model.term import Model
+from aqualog.model.effects import EFFECTS
+from aqualog.model.term import Model, Term
 from aqualog.validate.boundary import beyond
 from aqualog.validate.rating import LEAST_SAMPLES, rating
 from aqualog.validate.records import PLOTS, SIGNALS, Judged, Limit, Plan, Plot, Rated, Trace, Validity, Worst
+from aqualog.validate.sensors import late_velocity, offsets
 from aqualog.validate.spread import LEAST_DRIVES, spread_of
 
 __all__ = ["trace_of", "validate"]
@@ -96,6 +98,8 @@ def trace_of(drive: Drive, model: Model, signals: Signals) -> Trace:
     SignalError
         If nothing can be compared.
     """
+    wet = _wet(drive, signals)
+    model, taken_off = _with_sensors(drive, model, signals, wet)
     shown = simulated(drive, model)
     sides = []
     for columns in (drive.columns, shown):
@@ -112,11 +116,28 @@ def trace_of(drive: Drive, model: Model, signals: Signals) -> Trace:
             "nothing to compare with the simulation", where=drive.name,
             expected="wheel torques with a_x, wheel speeds, or a steering angle with a_y or yaw_rate",
         )  # fmt: skip
-    wet = block_means(_wet(drive, signals).astype(np.float64), drive.dt) > 0.0
     return Trace(
-        drive.name, block_step(drive.dt), drive.duration_s, sides[0], sides[1], drive.coordinates, drive.mask, wet,
-        drive.notes,
+        drive.name, block_step(drive.dt), drive.duration_s, sides[0], sides[1], drive.coordinates, drive.mask,
+        block_means(wet.astype(np.float64), drive.dt) > 0.0, (*drive.notes, *taken_off),
     )  # fmt: skip
+
+
+def _with_sensors(drive: Drive, model: Model, signals: Signals, wet: BoolArray) -> tuple[Model, list[str]]:
+    """The model with the constant errors of the drive's sensors, and a note on each."""
+    dry = np.convolve(wet, np.ones(round(RECOVERY_S / drive.dt) + 1))[: wet.size] < 0.5
+    notes = []
+    is_known = any(t.place == "v_x" for t in model.terms)
+    if late := 0.0 if is_known else late_velocity(drive, signals.array("v_x"), dry):
+        model = Model((*model.terms, Term(EFFECTS["signal_delay"], {"delay": late}, "v_x")))
+        notes.append(f"v_x comes {abs(late):.3f} s {'late' if late > 0.0 else 'early'}, by the free wheels: taken off")
+    if found := offsets(drive, model, dry):
+        model = Model((*model.terms, *found))
+        steer, gyro, a_y = (x for t in found for x in t.values.values())
+        of, units = ("road wheels", "yaw_rate", "a_y"), ("deg", "deg/s", "m/s²")
+        each = zip(of, (math.degrees(steer), math.degrees(gyro), a_y), units, strict=True)
+        said = ", ".join(f"{name} {x:+.2f} {unit}" for name, x, unit in each if abs(x) >= 0.005)
+        notes += [f"offsets taken off: {said}"] if said else []
+    return model, notes
 
 
 def _wet(drive: Drive, signals: Signals) -> BoolArray:

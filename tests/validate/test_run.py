@@ -174,13 +174,13 @@ def test_repeated_drives_give_the_tolerance_unless_the_user_does():
     (a_x,) = (j for j in found.judged if j.plot.name == "a_x over t")
     assert a_x.plot.tolerance.y_offset == found.spread["a_x"]
     assert a_x.share > 0.99
-    # all three share the delay between the speed and the wheels: less than the built-in 0.15 m/s, more than they differ
     assert found.spread["slip_fl"] < 0.08
-    assert next(j for j in found.judged if j.plot.name == "slip_fl over t").share < 0.9
+    assert all(j.share > 0.98 for j in found.judged if j.plot.x == "t" and "tie_rod" not in j.plot.y)
     own = Plot("a_x", "t", Tolerance(0.1, 0.0, 0.5, 0.0))
     given = judged(*drives, plan=Plan((own, *PLOTS[1:]), given=frozenset({"a_x"})))
     assert "a_x" not in given.spread
     assert given.plan.plots[0] == own
+
 
 def test_the_measured_curve_says_what_is_rated():
     """Not the simulation, whose errors widen the boundaries of three drives, nor a file of boundaries."""
@@ -195,7 +195,6 @@ def test_the_measured_curve_says_what_is_rated():
     every = [judged(*drives), judged(*drives, plan=wide), judged(*drives, model=light)]
     assert len({tuple((r.signal, r.seconds) for r in x.rated) for x in every}) == 1
     assert every[0].rated
-
 
 
 def test_long_stretches_are_rated_in_parts():
