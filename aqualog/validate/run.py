@@ -126,8 +126,11 @@ def _with_sensors(drive: Drive, model: Model, signals: Signals, wet: BoolArray) 
     """The model with the constant errors of the drive's sensors, and a note on each."""
     dry = np.convolve(wet, np.ones(round(RECOVERY_S / drive.dt) + 1))[: wet.size] < 0.5
     notes = []
-    is_known = any(t.place == "v_x" for t in model.terms)
-    if late := 0.0 if is_known else late_velocity(drive, signals.array("v_x"), dry):
+    is_known = any(t.effect.name == "signal_delay" and t.place == "v_x" for t in model.terms)
+    late = 0.0 if is_known else late_velocity(drive, signals.array("v_x"), dry)
+    if math.isnan(late):
+        notes.append("a delay of v_x would show as slip: no free wheel, or too even a speed, to find it by")
+    elif late:
         model = Model((*model.terms, Term(EFFECTS["signal_delay"], {"delay": late}, "v_x")))
         notes.append(f"v_x comes {abs(late):.3f} s {'late' if late > 0.0 else 'early'}, by the free wheels: taken off")
     if found := offsets(drive, model, dry):

@@ -31,18 +31,22 @@ _ASKED = (_OWN["steer_offset"], _OWN["gyro_offset"], _BIAS, *_OF_CAR)
 
 
 def late_velocity(drive: Drive, v_x: FloatArray, dry: BoolArray) -> float:
-    """By how much v_x (n,) is late against wheels that roll freely [s]; 0 where that is not sure.
+    """By how much v_x (n,) is late against wheels that roll freely [s]; 0 where they show none, NaN where that is open.
 
     Brakes slow these wheels: of a log without their pressure only driven stretches count. `dry` (n,): samples.
     """
     free = [i for i, w in enumerate(WHEELS) if w not in drive.vehicle.driving]
-    if not free or not {"v_x", *(f"omega_{w}" for w in WHEELS)} <= drive.present:
-        return 0.0
+    if not {"v_x", *(f"omega_{w}" for w in WHEELS)} <= drive.present:
+        return 0.0  # no slip is judged
+    if not free:
+        return math.nan
     pressure = drive.columns.get("brake_pressure")
     rolls = drive.course.torque.sum(axis=0) >= 0.0 if pressure is None else pressure <= BRAKE_PRESSURE
     wheels = centre_line_speeds(drive.columns, drive.vehicle)[free].mean(axis=0)
     late, sd = lateness(v_x, wheels, rolls & dry, drive.dt)
-    return late if Z95 * sd <= HALF_MAX and Z95 * sd < abs(late) <= LATEST else 0.0
+    if not (Z95 * sd <= HALF_MAX and abs(late) <= LATEST):
+        return math.nan
+    return late if abs(late) > Z95 * sd else 0.0
 
 
 def offsets(drive: Drive, model: Model, dry: BoolArray) -> tuple[Term, ...]:

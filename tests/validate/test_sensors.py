@@ -48,6 +48,7 @@ def test_wheels_that_may_be_driven_show_no_delay(given):
 
     found = validate([("d", late_by(0.3))], replace(CAR, **given), model=Model(), plan=Plan())
     assert not said(found, "v_x comes")
+    assert said(found, "a delay of v_x would show as slip")
 
 
 @pytest.mark.parametrize("name", ["steer_angle", "yaw_rate", "a_y"])
