@@ -120,7 +120,7 @@ def _recommended(case: Case, o: _Option, before: float, *, enough: bool) -> Mano
         if {h.key for h in members[i]} != {h.key for h in members[j]}
     ]  # fmt: skip
     decided = [q for q in pairs if o.gives.pairs[q] >= SURE]
-    rises = f"the probability of naming the right cause rises from {_percent(before)} to {_percent(after)}"
+    rises = _rises(before, after)
     how = f"{o.what.how}{OFTEN[o.times]} ({o.minutes:.0f} min)"
     if not enough:
         text = f"No run, check or further sensor distinguishes: {_told(members, pairs)}."
@@ -136,6 +136,12 @@ def _recommended(case: Case, o: _Option, before: float, *, enough: bool) -> Mano
     keys = tuple(dict.fromkeys((_keys(a), _keys(b)) for a, b in (_apart(members, q) for q in decided)))
     name = o.what.name if o.sensor is None else "sensor"
     return Manoeuvre(name, keys, text, np.nan, np.nan, o.minutes, before, after)
+
+
+def _rises(before: float, after: float) -> str:
+    if _percent(after) == _percent(before):
+        return f"less likely causes are ruled out; the right one is named with {_percent(after)}, as before"
+    return f"the probability of naming the right cause rises from {_percent(before)} to {_percent(after)}"
 
 
 def _percent(p: float) -> str:

@@ -214,3 +214,6 @@ def test_a_run_that_decides_nothing_is_not_recommended(after, best):
     start = "No run, check or further sensor distinguishes: tyre radius (front left wheel) from no effect."
     assert said.startswith(start + best)
     assert bool(best) == (len(said) > len(start))
+    # a run may rule out what is unlikely anyway
+    helps = _recommended(SimpleNamespace(rivals=rivals), option, 0.6, enough=True).sentence
+    assert ("rises from 60 % to 70 %" if best else "named with 60 %, as before") in helps
