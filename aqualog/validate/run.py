@@ -105,7 +105,7 @@ def trace_of(drive: Drive, model: Model, signals: Signals) -> Trace:
     for columns in (drive.columns, shown):
         channels = channel_values(columns, drive.channels, drive.vehicle, dt=drive.dt)
         by_name = dict(zip(drive.channels, channels, strict=True))
-        own = {n: by_name[n] for n in SIGNALS if n in by_name}
+        own = {n: by_name[n] for n in SIGNALS if n in by_name and (drive.vehicle.tie_rod or "tie_rod" not in n)}
         if "force_balance" in by_name:
             own["a_x"] = by_name["force_balance"]
         if "steer_angle" in drive.present:  # else the gyro leads the simulation
@@ -116,6 +116,8 @@ def trace_of(drive: Drive, model: Model, signals: Signals) -> Trace:
             "nothing to compare with the simulation", where=drive.name,
             expected="wheel torques with a_x, wheel speeds, or a steering angle with a_y or yaw_rate",
         )  # fmt: skip
+    if not drive.vehicle.tie_rod and any("tie_rod" in n for n in drive.channels):
+        taken_off.append("tie-rod forces are left out: the vehicle file has no [tie_rod] (`aqualog calibrate`)")
     return Trace(
         drive.name, block_step(drive.dt), drive.duration_s, sides[0], sides[1], drive.coordinates, drive.mask,
         block_means(wet.astype(np.float64), drive.dt) > 0.0, (*drive.notes, *taken_off),
