@@ -11,6 +11,7 @@ from aqualog.calibrate.balance import Balance, Sample, fit_balance
 from aqualog.calibrate.records import Parameter, TieRodFit
 from aqualog.calibrate.spread import Spread, half_width
 from aqualog.core.errors import ConfigError
+from aqualog.core.intervals import Z95
 from aqualog.core.provenance import provenance_of, uncertainty
 from aqualog.core.vehicle import KEYS, WATER, Provenance, Vehicle, WaterNumber
 
@@ -146,9 +147,10 @@ _KEYS = {
 
 
 def contradicted(parameters: Sequence[Parameter], vehicle: Vehicle) -> list[Parameter]:
-    """Return the estimates whose interval excludes what the vehicle file knows: its guesses are no knowledge.
+    """Return the estimates that are farther from what the vehicle file knows than both are unsure of: 95 %.
 
-    The torque gain does not count: it belongs to the torques as they are read. What `--fix` gives is no estimate.
+    Its guesses are no knowledge. The torque gain does not count: it belongs to the torques as they are read. What
+    `--fix` gives is no estimate.
     """
     radii = {"wheels.r_e_f", "wheels.r_e_r"}
     needs = {**{n: {key} for n, key in _KEYS.items() if n != "torque_gain"}, "r_e_ratio": radii}
@@ -156,9 +158,20 @@ def contradicted(parameters: Sequence[Parameter], vehicle: Vehicle) -> list[Para
     return [
         p
         for p in parameters
-        if p.identified and needs.get(p.name, {""}) <= known and p.ci95[0] < p.ci95[1]
-        and not p.ci95[0] <= p.file_value <= p.ci95[1]
+        if p.identified and (own := needs.get(p.name, {""})) <= known and p.ci95[0] < p.ci95[1]
+        and not _is_alike(p, [_relative(vehicle, key) for key in own])
     ]  # fmt: skip
+
+
+def _relative(vehicle: Vehicle, key: str) -> float:
+    return uncertainty(vehicle, key) / (abs(float(getattr(vehicle, KEYS[key].name))) or 1.0)
+
+
+def _is_alike(p: Parameter, relative: Sequence[float]) -> bool:
+    """Whether an estimate is the file's value, of which each part is known to a `relative` standard deviation."""
+    of_file = Z95 * math.hypot(*relative) * abs(p.file_value)
+    own = p.value - p.ci95[0] if p.file_value < p.value else p.ci95[1] - p.value
+    return abs(p.value - p.file_value) <= math.hypot(own, of_file)
 
 
 def keeping(parameters: Sequence[Parameter], odd: Container[str]) -> tuple[Parameter, ...]:

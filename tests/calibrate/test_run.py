@@ -297,6 +297,18 @@ def test_what_is_not_given_or_fixed_is_no_contradiction(series):
     assert not any(p.kept for p in calibrate(signals, ["a", "b"], given, {"mass": true.mass}).parameters)
 
 
+@pytest.mark.parametrize(("sd", "kept"), [(None, False), (1e-5, True)])
+def test_a_radius_off_by_less_than_its_source_leaves_is_no_contradiction(series, sd, kept):
+    signals, true, _, plain = series
+    found = plain.get("r_e_f")
+    half = 0.5 * (found.ci95[1] - found.ci95[0])
+    off = replace(
+        believed(true), r_e_f=found.value - 4.0 * half, given=believed(true).given | {"wheels.r_e_f"},
+        provenance={"wheels.r_e_f": Provenance("data_sheet" if sd is None else "measured", sd)},
+    )  # fmt: skip
+    assert calibrate(signals, ["a", "b"], off).get("r_e_f").kept == kept
+
+
 def test_beside_a_kept_drag_area_the_rolling_resistance_is_found_anew(series):
     """A file must fit its own drives: a rolling resistance that was found with another drag area does not."""
     signals, true, _, plain = series
