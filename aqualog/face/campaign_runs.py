@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.judgement import VERDICTS
-from aqualog.face.arguments import file_of
+from aqualog.face.arguments import file_of, writing
 from aqualog.face.campaign_inputs import CampaignInputs, split
 from aqualog.face.listener import Counted, Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, document_head, rows_table
@@ -388,7 +388,7 @@ class CampaignRuns(Result):
         force: bool = False,
         progress: Progress = None,
     ) -> Path:
-        """Write the campaign's page with a page for each run, and return the page.
+        """Write the campaign's page with a page for each run, all files or none, and return the page.
 
         An earlier report in the folder is replaced; `force` writes beside other files.
 
@@ -403,7 +403,8 @@ class CampaignRuns(Result):
         self.campaign.check_report(out, force=force)
         chosen = self.campaign.check_bins(by, bin_width=bin_width)
         findings = find(self.data, chosen, robust=robust, report=hear)
-        write_report(self.data, findings, out, report=Counted(hear, "pages of runs"))
+        with writing(out):
+            write_report(self.data, findings, out, report=Counted(hear, "pages of runs"))
         return out / "index.html"
 
 

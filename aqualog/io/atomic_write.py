@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from threading import Lock
 
 from aqualog.guard.reading import unfinished
 
-__all__ = ["only_here", "write_text", "write_together", "write_whole"]
+__all__ = ["folder_within", "move_together", "only_here", "write_text", "write_together", "write_whole"]
 
 _ASKING = Lock()
 
@@ -31,16 +33,50 @@ def write_whole(path: Path, write: Callable[[Path], object], *, makes_folder: bo
 
 def write_together(files: Mapping[Path, Callable[[Path], object]]) -> None:
     """Write files as `write_whole` does, and rename none before all are complete; new folders go if one fails."""
+    with _new_folders() as make, ExitStack() as stack:
+        done = []
+        for path, write in files.items():
+            make(path.parent)
+            done.append((stack.enter_context(_finished(path, write)), path))
+        move_together(done)
+
+
+@contextmanager
+def folder_within(folder: Path) -> Iterator[Path]:
+    """A folder for files that are to move into `folder` once all are there; new folders go if the block fails."""
+    with _new_folders() as make:
+        make(folder)
+        temporary = Path(tempfile.mkdtemp(prefix=".", suffix=".tmp", dir=folder))
+        with unfinished(temporary):
+            try:
+                yield temporary
+            finally:
+                shutil.rmtree(temporary, ignore_errors=True)
+
+
+def move_together(files: Iterable[tuple[Path, Path]]) -> None:
+    """Move files to their places in this order. An interrupt waits: it would leave a mixture of old and new."""
+
+    def move() -> None:
+        for made, path in files:
+            path.parent.mkdir(exist_ok=True)
+            made.replace(path)
+
+    with ThreadPoolExecutor(1) as mover:  # an interrupt comes to the main thread, which then waits for this one
+        mover.submit(move).result()
+
+
+@contextmanager
+def _new_folders() -> Iterator[Callable[[Path], None]]:
+    """Yield what makes a folder; those that are new go if the block fails."""
     made: list[Path] = []
+
+    def make(folder: Path) -> None:
+        made.extend(p for p in (folder, *folder.parents) if not p.exists())
+        folder.mkdir(parents=True, exist_ok=True)
+
     try:
-        with ExitStack() as stack:
-            done = []
-            for path, write in files.items():
-                made += [p for p in (path.parent, *path.parent.parents) if not p.exists()]
-                path.parent.mkdir(parents=True, exist_ok=True)
-                done.append((stack.enter_context(_finished(path, write)), path))
-            for temporary, path in done:
-                temporary.replace(path)
+        yield make
     except BaseException:
         for folder in made:  # the innermost first; one that holds anything stays
             with suppress(OSError):

@@ -1,4 +1,4 @@
-"""The folder of a campaign's report: page, plotly.js, pages of the runs, tables; each file whole, the page last."""
+"""The folder of a campaign's report: page, plotly.js, pages of the runs, tables; all of them or none."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from aqualog.campaign.bins import Group
 from aqualog.campaign.results import CampaignData
 from aqualog.core.errors import ConfigError
 from aqualog.detect.registry import DETECTORS
-from aqualog.io.atomic_write import write_text
+from aqualog.io.atomic_write import folder_within, move_together, write_text
 from aqualog.report.campaign.findings import Curve, Findings
 from aqualog.report.campaign.labels import file_name
 from aqualog.report.campaign.page import campaign_page
@@ -71,13 +71,29 @@ def check_folder(folder: Path, *, force: bool) -> None:
 def write_report(data: CampaignData, findings: Findings, folder: Path, *, report: Report = lambda *_: None) -> int:
     """Write the report; number of files. `check_folder` must have been asked before.
 
-    Each file is complete or absent, and the page comes last, so that its links work. Pages of an
-    earlier report that have no run any more are removed; files that are not of a report stay.
+    All files are complete before the first takes its place, and the page comes last, so that its links work. Pages of
+    an earlier report that have no run any more are removed; files that are not of a report stay.
     """
     pages = page_names([r.name for r in data.runs])
     earlier = _earlier(folder)
-    own = sorted({*pages, *(f"data/{t}" for t in _TABLES), "plotly.min.js", "index.html"})
-    _mark(folder, sorted({*own, *earlier}))
+    own = sorted({*pages, *(f"data/{t}" for t in _TABLES), "plotly.min.js"})
+    with folder_within(folder) as made:
+        facts = _write_pages(data, made, pages, report)
+        for name, text in tables_of(data, findings, facts, pages).items():
+            write_text(made / "data" / name, _clean(text))
+        write_text(made / "plotly.min.js", plotly_js())
+        write_text(made / "index.html", _clean(campaign_page(data, findings, facts, pages)))
+        _mark(made / "both", sorted({*own, "index.html", *earlier}))
+        _mark(made / MARK, sorted({*own, "index.html"}))
+        names = {"both": MARK} | {name: name for name in (*own, "index.html", MARK)}
+        move_together((made / name, folder / place) for name, place in names.items())
+    for name in set(earlier) - {*own, "index.html"}:
+        (folder / name).unlink(missing_ok=True)
+    return len(own) + 2
+
+
+def _write_pages(data: CampaignData, folder: Path, pages: Sequence[str], report: Report) -> list[RunFacts | None]:
+    """Write the pages of the runs; their facts."""
     facts: list[RunFacts | None] = []
     # most of a small file's time is the wait until the disk has it
     with ThreadPoolExecutor(_WRITERS) as writers:
@@ -91,15 +107,7 @@ def write_report(data: CampaignData, findings: Findings, folder: Path, *, report
             while len(writing) > (_WAITING if i + 1 < len(pages) else 0):
                 writing.popleft().result()
             report(i + 1, len(pages))
-    for name, text in tables_of(data, findings, facts, pages).items():
-        write_text(folder / "data" / name, _clean(text))
-    write_text(folder / "plotly.min.js", plotly_js())
-    page = campaign_page(data, findings, facts, pages)
-    write_text(folder / "index.html", _clean(page))
-    for name in set(earlier) - set(own):
-        (folder / name).unlink(missing_ok=True)
-    _mark(folder, own)
-    return len(own) + 1
+    return facts
 
 
 def _clean(text: str) -> str:
@@ -107,9 +115,9 @@ def _clean(text: str) -> str:
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
-def _mark(folder: Path, files: Sequence[str]) -> None:
+def _mark(path: Path, files: Sequence[str]) -> None:
     document: Mapping[str, object] = {"schema_version": 1, "files": list(files)}
-    write_text(folder / MARK, json.dumps(document, indent=1) + "\n")
+    write_text(path, json.dumps(document, indent=1) + "\n")
 
 
 def _earlier(folder: Path) -> list[str]:

@@ -1,10 +1,12 @@
 """The report of a campaign: what it holds, that names stay text, that the folder is whole and the same each time."""
 
+import _thread
 import csv
 import json
 import math
 import re
 import shutil
+import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,6 +21,8 @@ from aqualog.campaign.results import RunInfo, RunSamples
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError
 from aqualog.core.judgement import Judgement
+from aqualog.io.atomic_write import move_together
+from aqualog.report.campaign import folder as folder_module
 from aqualog.report.campaign.answers import answers_of, verdicts
 from aqualog.report.campaign.findings import Curve, Point, crossing, find
 from aqualog.report.campaign.folder import MARK, check_folder, page_names, write_report
@@ -319,6 +323,43 @@ def test_earlier_report_is_replaced_and_other_files_stay(case, findings, tmp_pat
     assert json.loads((out / MARK).read_text())["files"] == sorted(
         str(p.relative_to(out)) for p in out.rglob("*") if p.is_file() and p.name not in (MARK, "notes.txt")
     )
+
+
+@pytest.mark.parametrize("has_earlier", [False, True])
+def test_a_report_that_is_broken_off_leaves_what_was_there(case, findings, folder, tmp_path, monkeypatch, has_earlier):
+    out = tmp_path / "out"
+    if has_earlier:
+        shutil.copytree(folder, out)
+        (out / "index.html").write_text("earlier")
+    before = files_in(tmp_path)
+
+    def broken(*_):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_report(case, findings, out, report=broken)
+    monkeypatch.setattr(folder_module, "campaign_page", broken)  # after all pages of runs
+    with pytest.raises(KeyboardInterrupt):
+        write_report(case, findings, out)
+    assert files_in(tmp_path) == before
+    assert out.exists() == has_earlier
+
+
+def test_an_interrupt_waits_until_all_files_are_in_their_places(tmp_path):
+    made = [tmp_path / str(i) for i in range(20)]
+    for path in made:
+        path.write_text("new")
+
+    def pairs():
+        for i, path in enumerate(made):
+            yield path, tmp_path / "out" / path.name
+            if i == 5:
+                _thread.interrupt_main()
+                time.sleep(0.2)
+
+    with pytest.raises(KeyboardInterrupt):
+        move_together(pairs())
+    assert len(list((tmp_path / "out").iterdir())) == 20
 
 
 def test_folders_of_other_things_are_refused(tmp_path):
