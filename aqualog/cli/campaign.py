@@ -50,8 +50,7 @@ def init(run: Run, folder: Path, out: Path) -> Output:
 
     with run.hearing() as hear:
         found = Campaign.propose(folder, out, vehicle=run.vehicle, dbc=run.dbc, force=run.force, progress=hear)
-        found.write_files()
-    return Output(found, found.notes)
+    return Output(found, found.notes, files=found.files_there())
 
 
 @command(
@@ -184,10 +183,8 @@ def _binned(
         return run.of_runs(runs)
     with run.hearing() as hear:
         found = find(runs, hear)
-    if table is not None:
-        found.write(table, force=True)
-    written = [] if table is None else [f"the table is {table}"]
-    return run.of_runs(runs, result=found, notes=[*found.notes, *written])
+    files = {} if table is None else {table: found.table_file(table)}
+    return run.of_runs(runs, result=found, notes=[*found.notes, *(f"the table is {p}" for p in files)], files=files)
 
 
 @command("campaign:file out:report by width robust store dbc jobs force")

@@ -153,8 +153,6 @@ def slip_slope(run: Run, out: Path | None, method: str, traction: str, mu_max: f
     drive = run.drive([out / n for n in SLIP_SLOPE_FILES] if out else [])
     with run.hearing() as hear:
         result = slip_slope(drive, method=method, traction=traction, mu_max=mu_max, delay=delay, progress=hear)
-        hear("writing")
-        if out is not None:
-            result.save(out, force=True)
-    where = [f"results are in {out}: {', '.join(SLIP_SLOPE_FILES)}"] if out is not None else []
-    return Output(result, [*result.notes, *where])
+    files = {} if out is None else {out / name: write for name, write in result.files().items()}
+    where = [f"results are in {out}: {', '.join(SLIP_SLOPE_FILES)}"] if files else []
+    return Output(result, [*result.notes, *where], files=files)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aqualog.cli.frame import Output, Run, command
+from aqualog.cli.frame import Output, Run, command, files_at
 
 if TYPE_CHECKING:
     from aqualog.face.diagnose import Diagnosis
@@ -41,8 +42,7 @@ def calibrate(run: Run, out: Path | None, wet: bool, fix: list[str] | None, acce
 
     run.need_vehicle("which axle is driven, radii, axle distances")
     fixed = _fixed(fix or [], wet=wet)
-    targets = [p for p in (out, page) if p is not None]
-    drive = run.drive(targets)
+    drive = run.drive([p for p in (out, page) if p is not None])
     try:
         with run.hearing("nothing was written") as hear:
             result = calibrate(
@@ -50,11 +50,8 @@ def calibrate(run: Run, out: Path | None, wet: bool, fix: list[str] | None, acce
             )
     except NothingUsableError:  # each reason was reported
         return Output(code=int(ExitCode.NOTHING_USABLE))
-    if out is not None:
-        result.write_vehicle(out, force=True)
-    if page is not None:
-        result.write_page(page, force=True)
-    return Output(result, [*result.notes, *(f"written: {path}" for path in targets)])
+    files = files_at(result, {"calibrated.toml": out, "calibration.html": page})
+    return Output(result, [*result.notes, *(f"written: {path}" for path in files)], files=files)
 
 
 def _fixed(texts: list[str], *, wet: bool) -> dict[str, float]:
@@ -152,7 +149,7 @@ def _drives(run: Run, holdout: list[str], out: Path | None, page: Path | None, o
             )  # fmt: skip
     except NothingUsableError:  # each reason was reported
         return Output(code=int(ExitCode.NOTHING_USABLE))
-    return Output(*_written(result, out, page))
+    return _output(result, out, page)
 
 
 def _campaign(run: Run, out: Path | None, page: Path | None, options: dict[str, Any]) -> Output:
@@ -171,18 +168,15 @@ def _campaign(run: Run, out: Path | None, page: Path | None, options: dict[str, 
         return run.of_runs(runs)
     with run.hearing() as hear:
         result = diagnose(runs, model=known, progress=hear, **options)
-    result, notes = _written(result, out, page)
-    return run.of_runs(runs, result=result, notes=notes)
+    return replace(_output(result, out, page), code=run.of_runs(runs).code)
 
 
-def _written(result: Diagnosis, model: Path | None, page: Path | None) -> tuple[Diagnosis, list[str]]:
-    """Write the files; return the result, which then names its model file, and its notes."""
+def _output(result: Diagnosis, model: Path | None, page: Path | None) -> Output:
+    """Return the output of a diagnosis, which names its model file."""
     if model is not None:
         result = result.naming(model)
-        result.write_model(model, force=True)
-    if page is not None:
-        result.write_page(page, force=True)
-    return result, [*result.notes, *(f"written: {path}" for path in (model, page) if path is not None)]
+    files = files_at(result, {"model.toml": model, "diagnosis.html": page})
+    return Output(result, [*result.notes, *(f"written: {path}" for path in files)], files=files)
 
 
 @command(
@@ -218,9 +212,8 @@ def validate(run: Run, method: str, boundaries: Path | None, why: bool, out: Pat
             )  # fmt: skip
     except NothingUsableError:  # each reason was reported
         return Output(code=int(ExitCode.NOTHING_USABLE))
-    if out is not None:
-        result.write_page(out, force=True)
-    return Output(result, [*result.notes, *([f"the page is {out}"] if out is not None else [])])
+    files = files_at(result, {"validation.html": out})
+    return Output(result, [*result.notes, *(f"the page is {path}" for path in files)], files=files)
 
 
 @command(
@@ -275,17 +268,16 @@ def evaluate(
         )  # fmt: skip
     found = found.gated(gate or ())
     has_records = bool(found.evaluation.records)
-    if tune is not None and has_records and found.evaluation.tuning is not None:
-        found.write_thresholds(tune, force=True)
-    if out is not None and has_records:
-        found.write_page(out, force=True)
-    if junit is not None:  # also without a drive: the build server then shows why
-        found.write_junit(junit, force=True)
+    # gates also without a drive: the build server then shows why
+    files = {} if junit is None else {junit: found.junit_file()}
+    if has_records:
+        tuned = tune if found.evaluation.tuning is not None else None
+        files |= files_at(found, {"thresholds.toml": tuned, "evaluation.html": out})
     with run.hearing() as hear:
         for name, reason in found.evaluation.failed.items():
             hear.failed(name, reason)
     if not has_records:
-        return Output(code=int(ExitCode.NOTHING_USABLE))
+        return Output(code=int(ExitCode.NOTHING_USABLE), files=files)
     for name, reason in found.late.items():
         run.console.error(f"{name}: {reason}")
     odd = [n for n in found.notes if ODD_LABELS in n]
@@ -294,4 +286,5 @@ def evaluate(
     written += [f"the gates are in {junit}"] if junit is not None else []
     has_tripped = any(not g.is_kept for g in found.gates)
     details = [f"note: {n}" for n in (*found.notes, *found.cut) if n not in odd]
-    return Output(found, [*odd, *written], details, code=int(ExitCode.GATE_TRIPPED) if has_tripped else None)
+    code = int(ExitCode.GATE_TRIPPED) if has_tripped else None
+    return Output(found, [*odd, *written], details, code=code, files=files)

@@ -6,7 +6,7 @@ import inspect
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,17 +22,19 @@ if TYPE_CHECKING:
     from aqualog.face.drive import Drive
     from aqualog.face.result import Result
 
-__all__ = ["BATCH_BROKEN_OFF", "Output", "Run", "command"]
+__all__ = ["BATCH_BROKEN_OFF", "Output", "Run", "command", "files_at"]
 
 _GROUPS = {"data": ("csv", "decimal_comma:tables", "json")}
 """Options that stand together: in which forms a command gives its result."""
+
+Files = Mapping[Path, Callable[[Path], None]]
 
 BATCH_BROKEN_OFF = "the logs that are done are kept, the same command goes on with the rest"
 
 
 @dataclass(frozen=True, slots=True)
 class Output:
-    """What a command leaves on stdout and stderr, and its exit code.
+    """What a command leaves on stdout and stderr, its exit code, and files to write, all with the tables or none.
 
     `text` stands for a reader in place of the result's own; `notes` come after it, `details` with -v after those.
     Without `code` it is 3 where the result has a loss, else 0.
@@ -43,6 +45,12 @@ class Output:
     details: Sequence[str] = ()
     text: str | None = None
     code: int | None = None
+    files: Files = field(default_factory=dict)
+
+
+def files_at(result: Result, places: Mapping[str, Path | None]) -> Files:
+    """Return the files of a result that have a place, by it."""
+    return {path: result.files()[name] for name, path in places.items() if path is not None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,14 +201,17 @@ class Run:
             raise ConfigError("--decimal-comma without --csv", expected="--csv FILE.csv, the tables that it is for")
 
     def finish(self, output: Output) -> int:
-        """Write the tables that were asked for, print what a command leaves, and return its exit code."""
+        """Write the files that were asked for, print what a command leaves, and return its exit code."""
         from aqualog.core.errors import ExitCode
+        from aqualog.face.arguments import refuse_existing, write_together
 
         result = output.result
-        tables: Sequence[Path] = ()
+        tables: Files = {}
+        if result is not None and self.csv is not None:
+            tables = result.csv_files(self.csv, decimal_comma=self.decimal_comma, force=self.force)
+        refuse_existing([*output.files, *tables], force=True)  # no two results with one name
+        write_together({**output.files, **tables})
         if result is not None:
-            if self.csv is not None:
-                tables = result.write_csv(self.csv, decimal_comma=self.decimal_comma, force=self.force)
             self.console.data(result, as_json=self.json, text=output.text)
         for text in (*output.notes, *([f"tables: {', '.join(map(str, tables))}"] if tables else [])):
             self.console.note(text)

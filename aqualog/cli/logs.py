@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aqualog.cli.frame import Output, Run, command
+from aqualog.cli.frame import Output, Run, command, files_at
 
 if TYPE_CHECKING:
     from aqualog.core.records import Signals
@@ -38,11 +38,9 @@ def inspect(run: Run, write_map: Path | None) -> Output:
     drive = run.drive([write_map] if write_map else [])
     with run.hearing() as hear:
         found = inspect(drive, progress=hear)
-    notes = []
-    if write_map is not None:
-        found.write_map(write_map, force=True)
-        notes = [f"proposed map with {len(found.proposals)} signals is in {write_map}: check it before you use it"]
-    return Output(found, notes, code=int(found.exit_code))
+    files = files_at(found, {"map.toml": write_map})
+    notes = [f"proposed map with {len(found.proposals)} signals is in {p}: check it before you use it" for p in files]
+    return Output(found, notes, code=int(found.exit_code), files=files)
 
 
 def _campaign(run: Run, *, has_log_options: bool) -> Output:
@@ -92,8 +90,8 @@ def init(run: Run, out: Path) -> Output:
             drive, out, run.vehicle, ask=ask if run.console.can_ask() and not run.json else None, force=run.force,
             progress=hear,
         )  # fmt: skip
-        found.write_files(force=run.force)
-    return Output(found, code=int(found.exit_code))
+    files = {found.folder / name: write for name, write in found.files().items()}
+    return Output(found, code=int(found.exit_code), files=files)
 
 
 @command("logs vehicle signals dbc out:page data force")
@@ -118,11 +116,8 @@ def doctor(run: Run, out: Path | None) -> Output:
     drive = run.drive([out] if out else [])
     with run.hearing() as hear:
         found = doctor(drive, progress=hear)
-    notes = []
-    if out is not None:
-        found.write_page(out, force=True)
-        notes = [f"written: {out}"]
-    return Output(found, notes, code=int(found.exit_code))
+    files = files_at(found, {"doctor.html": out})
+    return Output(found, [f"written: {path}" for path in files], code=int(found.exit_code), files=files)
 
 
 @command("logs out:log vehicle signals dbc rate decimal_comma force")
@@ -201,13 +196,12 @@ def align(
             drive, quantity=quantity, channels=dict(pair.partition("=")[::2] for pair in channel or ()),
             max_offset_s=max_offset, start_offset_s=start_offset, progress=hear,
         )  # fmt: skip
-    notes = []
-    if write_map is not None and result.fits:
-        result.write_map(write_map, force=True)
-        notes = [f"clocks of {', '.join(result.fits)} are in {write_map}"]
-        if run.signals is None:
-            notes.append("it holds clocks only: give --signals map.toml to keep the signals of your map in it")
-    return Output(result, [*notes, *result.notes], code=None if result.fits else int(ExitCode.NOTHING_USABLE))
+    files = files_at(result, {"map.toml": write_map if result.fits else None})
+    notes = [f"clocks of {', '.join(result.fits)} are in {path}" for path in files]
+    if files and run.signals is None:
+        notes.append("it holds clocks only: give --signals map.toml to keep the signals of your map in it")
+    code = None if result.fits else int(ExitCode.NOTHING_USABLE)
+    return Output(result, [*notes, *result.notes], code=code, files=files)
 
 
 @command("clean data force verbose", has_steps=False)

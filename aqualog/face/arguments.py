@@ -12,6 +12,7 @@ import os
 import stat
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from aqualog.core.errors import AqualogError, ConfigError, LogError
@@ -20,7 +21,7 @@ from aqualog.io.open_log import LOG_SUFFIXES, sniff
 
 __all__ = [
     "VEHICLE_HINT", "check_name", "expand", "file_of", "list_files", "names_of", "no_vehicle", "number_of",
-    "refuse_existing", "text_of", "whole_number", "write_text", "write_together", "write_whole", "writing",
+    "refuse_existing", "text_of", "whole_number", "write_together", "write_whole", "writing",
 ]  # fmt: skip
 
 
@@ -223,15 +224,14 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
 
 
 def write_together(files: Mapping[Path, Callable[[Path], None]]) -> None:
-    """Write files whole, all of them or none; an AqualogError if one fails."""
+    """Write files whole, all of them or none; an AqualogError that names the file if one fails."""
+
+    def named(path: Path, write: Callable[[Path], None], temporary: Path) -> None:
+        with writing(path):
+            write(temporary)
+
     with writing(next(iter(files)).parent if files else Path()):
-        atomic_write.write_together(files)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file whole or not at all; an AqualogError if that fails."""
-    with writing(path):
-        atomic_write.write_text(path, text)
+        atomic_write.write_together({p: partial(named, p, write) for p, write in files.items()})
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -133,6 +133,10 @@ class Comparison(Result):
 
     def write_junit(self, path: PathLike, *, force: bool = False) -> Path:
         """Write gates and drives as JUnit XML, which build servers show: a drive that cannot be read is an error."""
+        return self._write_to(path, self.junit_file(), force=force)
+
+    def junit_file(self) -> Callable[[Path], None]:
+        """Return what writes the file of `write_junit`."""
         from aqualog.report.junit import Case, Suite, junit_xml
 
         gates = [
@@ -148,8 +152,7 @@ class Comparison(Result):
             *(Case("drives", r.name) for r in self.evaluation.records),
             *(Case("drives", name, error=reason) for name, reason in self.evaluation.failed.items()),
         ]
-        text = junit_xml([Suite("gates", gates), Suite("drives", drives)])
-        return self._write_to(path, text_file(lambda: text), force=force)
+        return text_file(lambda: junit_xml([Suite("gates", gates), Suite("drives", drives)]))
 
     def _thresholds(self) -> str:
         from aqualog.config.thresholds import joint_text, thresholds_text

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from aqualog.core.errors import ConfigError
-from aqualog.face.arguments import file_of, names_of, refuse_existing, write_text
+from aqualog.face.arguments import file_of, names_of, refuse_existing, write_together
 from aqualog.face.listener import Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, document_head, rows_table, text_file
 
@@ -154,7 +154,11 @@ class Proposal(Result, Generic[AnyCampaign]):
 
     def files(self) -> Writers:
         """Return the campaign file and the files beside it, by name."""
-        return {p.name: text_file(partial(str, text)) for p, text in self.texts.items()}
+        return {p.name: write for p, write in self.files_there().items()}
+
+    def files_there(self) -> Mapping[Path, Callable[[Path], None]]:
+        """Return the files where `propose` was asked to put them."""
+        return {p: text_file(partial(str, text)) for p, text in self.texts.items()}
 
     def write(self) -> AnyCampaign:
         """Write the files where `propose` was asked to put them, and return the campaign.
@@ -168,9 +172,8 @@ class Proposal(Result, Generic[AnyCampaign]):
         return self.opened(self.out, dbc=self.dbc)
 
     def write_files(self) -> None:
-        """Write the files where `propose` was asked to put them; the campaign file last."""
-        for path, text in self.texts.items():
-            write_text(path, text)
+        """Write the files where `propose` was asked to put them, all of them or none; the campaign file last."""
+        write_together(self.files_there())
 
 
 def propose(

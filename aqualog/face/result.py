@@ -106,7 +106,7 @@ class Result(ABC):
         return tuple(out / name for name in files)
 
     def write_csv(self, path: PathLike, *, decimal_comma: bool = False, force: bool = False) -> tuple[Path, ...]:
-        """Write the tables that the command shows as CSV, each whole or not at all.
+        """Write the tables that the command shows as CSV, all of them whole or none.
 
         Parameters
         ----------
@@ -125,6 +125,14 @@ class Result(ABC):
         AqualogError
             If a file cannot be written.
         """
+        files = self.csv_files(path, decimal_comma=decimal_comma, force=force)
+        write_together(files)
+        return tuple(files)
+
+    def csv_files(
+        self, path: PathLike, *, decimal_comma: bool = False, force: bool = False
+    ) -> Mapping[Path, Callable[[Path], None]]:
+        """Return the files of `write_csv`, each with its writer, once they are checked."""
         from aqualog.report.spreadsheet import csv_bytes
 
         first = check_csv(file_of(path, "path"))
@@ -135,9 +143,7 @@ class Result(ABC):
             if frame.columns
         }
         refuse_existing(frames, force=force, sources=self.sources)
-        for target, frame in frames.items():
-            write_whole(target, _bytes_file(csv_bytes(frame, decimal_comma=decimal_comma)))
-        return tuple(frames)
+        return {p: _bytes_file(csv_bytes(frame, decimal_comma=decimal_comma)) for p, frame in frames.items()}
 
     def _write_as(self, name: str, path: PathLike, *, force: bool) -> Path:
         """Write the file that `save` calls `name` to a path of the user's choice."""

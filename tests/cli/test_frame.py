@@ -1,5 +1,7 @@
 """What all commands share: tables as CSV."""
 
+import errno
+
 import polars as pl
 import pytest
 
@@ -61,6 +63,22 @@ def test_a_table_beside_is_not_overwritten(table, tmp_path):
     assert done.exit_code == 2
     assert not (tmp_path / "c.csv").exists()
     assert "c_proposed.csv: exists already" in one_error_line(done)
+
+
+def test_files_that_were_asked_for_are_written_together_or_none(table, tmp_path, monkeypatch):
+    def full(path):
+        path.write_text("a part")
+        if not path.name.startswith(".runs-"):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("aqualog.face.result._bytes_file", lambda _: full)
+    for command, option in (("inspect", "--write-map"), ("doctor", "-o"), ("init", "-o")):
+        done = run(command, table, option, "new/a", "--csv", "c.csv", cwd=tmp_path)
+        assert done.exit_code == 1
+        assert one_error_line(done).startswith("error: c.csv: cannot be written (No space left on device)")
+    monkeypatch.setattr("aqualog.face.propose.text_file", lambda _: full)
+    assert "vehicle.toml: cannot" in one_error_line(run("campaign", "init", table.parent, "-o", "c.toml", cwd=tmp_path))
+    assert not list(tmp_path.iterdir())
 
 
 def test_layouts_stand_beside_the_written_log(tmp_path):
