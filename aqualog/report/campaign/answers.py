@@ -98,7 +98,8 @@ def headline(data: CampaignData, findings: Findings) -> str:
 
 
 def verdicts(data: CampaignData) -> list[str]:
-    """How many runs aquaplaned, how many did not, and how many cannot be judged, with what they lack."""
+    """How many runs aquaplaned, how many did not, how many cannot be judged, and how many are doubtful."""
+    doubtful = [r for r in data.done if r.checks and r.judgement.verdict != "cannot_be_judged"]
     of = {v: [r for r in data.done if r.judgement.verdict == v] for v in VERDICTS}
     wet, dry, blind = of["aquaplaning"], of["none"], of["cannot_be_judged"]
     lacks = sorted({missing_words(r.judgement.missing) for r in blind})
@@ -107,6 +108,7 @@ def verdicts(data: CampaignData) -> list[str]:
         (wet, f"Aquaplaning in {counted(len(wet), 'run')}: {episodes}"),
         (dry, f"No aquaplaning in {counted(len(dry), 'run')}"),
         (blind, f"Aquaplaning cannot be judged in {counted(len(blind), 'run')}: {'; or '.join(lacks[:3])}"),
+        (doubtful, f"Doubtful, check the inputs first: {counted(len(doubtful), 'run')}"),
     ]
     return [words for runs, words in told if runs]
 

@@ -262,6 +262,7 @@ def _runs(
         "page": list(pages),
         "state": [_STATES.index(r.state) for r in data.runs],
         "verdict": [_VERDICTS.index(r.judgement.verdict) if r.is_done else -1 for r in data.runs],
+        "doubtful": [int(bool(r.checks) and r.judgement.verdict != "cannot_be_judged") for r in data.runs],
         "episodes": [len(r.judgement.of("aquaplaning")) for r in data.runs],
         "facets": [f["runs"] for f in facets],
         "group": [index[group_of(r.run, keys)] for r in data.runs],

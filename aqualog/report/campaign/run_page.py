@@ -66,8 +66,9 @@ def run_page(
     fold = "; ".join([*(folded_line(k, judgement.of(k)) for k in FOLDED if judgement.of(k)),
                       f"{counted(len(info.events), 'detection')}, one by one"])  # fmt: skip
     drawn, island = _over_time(info, samples, full) if samples is not None else ([], {})
+    verdict = headline(judgement, doubted=bool(info.checks)) if info.is_done else "No results"
     sections = [
-        Section("", [Headline(headline(judgement) if info.is_done else "No results", _answers(info))], "verdict",
+        Section("", [Headline(verdict, _answers(info))], "verdict",
                 look=f"verdict events {level(judgement)}"),
         Section("Notes", [Lines(_problems(info), most=1000)], "quality", look="problems"),
         *drawn,

@@ -236,7 +236,8 @@ const VERDICTS = ["yes", "none", "cannot be judged"]; // in the order of the doc
 const columns = [
   ["#", "num", function (i) { return i + 1; }],
   ["Run", "", function (i) { return runs.name[i]; }],
-  ["Aquaplaning", "", function (i) { return (runs.verdict[i] + 4) % 4; }, function (i) { return ["", ...VERDICTS][runs.verdict[i] + 1]; }],
+  ["Aquaplaning", "", function (i) { return (runs.verdict[i] + 4) % 4; },
+    function (i) { return ["", ...VERDICTS][runs.verdict[i] + 1] + (runs.doubtful[i] ? "; doubtful, check the inputs first" : ""); }],
   ["Episodes", "num", function (i) { return runs.verdict[i] === 0 || runs.verdict[i] === 1 ? runs.episodes[i] : -1; },
     function (i) { return runs.verdict[i] === 0 || runs.verdict[i] === 1 ? String(runs.episodes[i]) : "–"; }],
   ["Lane [km/h]", "num", function (i) { return runs.v[i] ?? -1; }, function (i) { return runs.v[i] === null ? "–" : runs.v[i].toFixed(0); }],

@@ -17,7 +17,7 @@ import pytest
 from typer.testing import CliRunner
 
 from aqualog.campaign.bins import plan
-from aqualog.campaign.results import RunInfo, RunSamples
+from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.cli.main import app
 from aqualog.core.errors import ConfigError
 from aqualog.core.judgement import Judgement
@@ -187,6 +187,18 @@ def test_verdict_of_each_run_and_of_all(page, case):
     told = verdicts(case)
     assert told[0] == f"Aquaplaning in {len(wet)} runs: {sum(len(r.judgement.of('aquaplaning')) for r in wet)} episodes"
     assert all(f"<li>{line}</li>" in page for line in told)
+
+
+def test_a_verdict_with_inputs_that_do_not_fit_is_doubtful_everywhere(case, findings):
+    check = {"kind": "slip", "signals": ["a_x"], "what": "a_x is late", "advice": "", "lines": [], "value": None}
+    runs = list(case.runs)
+    runs[9] = replace(runs[9], about={**runs[9].about, "checks": [{**check, "value_ci95": [None, None]}]})
+    data = CampaignData(case.configured, case.store, runs)
+    whole = campaign_page(data, findings, [None] * len(runs), [""] * len(runs))
+    assert [i for i, x in enumerate(data_of(whole)["runs"]["doubtful"]) if x] == [9]
+    assert "<li>Doubtful, check the inputs first: 1 run</li>" in whole
+    own = run_page(data, runs[9], case.samples(runs[9]), None, back="")
+    assert re.search(r'class="headline">Aquaplaning: [^<]*; doubtful, check the inputs first', own)
 
 
 def test_run_that_cannot_be_judged_is_neither_green_nor_orange(case):
