@@ -207,7 +207,7 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     ),
     "seed:drawn": _option(int, 1, "--seed", help="Of all that is drawn at random.", min=0, max=2**63 - 1),
     "surrogates": _option(
-        int | None, None, "--surrogates", help="How many draws of noise calibrate the test.", min=1,
+        int | None, None, "--surrogates", help="How many draws of noise calibrate the test.", min=2,
         max=100_000, metavar="N",
     ),
     "bootstrap": _option(

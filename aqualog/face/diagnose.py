@@ -229,7 +229,7 @@ def diagnose(
     level : float
         Share of drives without effect that may be given one, 0.0001 to 0.5.
     surrogates : int, optional
-        Draws of noise that calibrate the test; 0: the test by its formula alone. Default 499.
+        Draws of noise that calibrate the test, 2 or more; 0: the test by its formula alone. Default 499.
     views : bool
         Keep the residuals before and after for page and figure, as the command does with `--page`. The document then
         has the units of all channels.
@@ -252,6 +252,8 @@ def diagnose(
     seed = whole_number(seed, "seed", 0, 2**63 - 1)
     if surrogates is not None:
         surrogates = whole_number(surrogates, "surrogates", 0, 100_000)
+        if surrogates == 1:  # the spread of one draw is not known
+            raise ConfigError("surrogates = 1", expected="0, or 2 to 100000")
     options: dict[str, Any] = {"seed": seed, "level": level}
     options |= {} if surrogates is None else {"surrogates": surrogates}
     campaign = _campaign_of(drives, vehicle)

@@ -158,6 +158,7 @@ def test_nothing_is_fitted_and_held_out(run, folder):
     ("args", "said"),
     [
         (["--surrogates", "9", "--no-bootstrap"], "--surrogates beside --no-bootstrap"),
+        (["--surrogates", "1"], "--surrogates"),
         (["-o", "a.parquet"], "is a source of this very run"),
         (["--page", "b.parquet", "--holdout", "b.parquet", "--force"], "is a source of this very run"),
         (["-o", "car.toml", "--force"], "is a source of this very run"),

@@ -125,6 +125,7 @@ def test_messages_name_arguments_and_no_options():
         lambda: aq.convert(LOG, "x.mf4", decimal_comma=True),
         lambda: aq.slip_slope(LOG, CAR, method="x"),
         lambda: aq.calibrate(LOG, CAR, fix={"x": 1.0}),
+        lambda: aq.diagnose(LOG, CAR, surrogates=1),
     ):
         with pytest.raises(aq.AqualogError) as caught:
             call()
