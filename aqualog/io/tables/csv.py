@@ -477,8 +477,8 @@ class CsvReader(TableReader):
         for name in self._layout.twice:
             self._note(f'several columns are called "{name}": "{name}", "{name}#2" and so on in a map')
         for column in self._layout.columns:
-            if column.kind == "text" and column.text_share < 1.0:
-                share = f'{100 * column.text_share:.0f} % of its cells are text such as "{column.example[:40]}"'
+            if column.kind == "text" and column.texts < column.sampled:
+                share = f'{column.texts} of {column.sampled} cells looked at are text such as "{column.example[:40]}"'
                 self._note(f'column "{column.name}" is left out: {share}')
 
     def close(self) -> None:

@@ -45,7 +45,7 @@ _GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # as good a fracti
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One column by its header and its sampled cells; `text_share` is the share of cells that are no value.
+    """One column by its header and its sampled cells; `texts` of `sampled` filled ones are no value.
 
     `name` is unique in the file, `header` what stands above it.
     """
@@ -55,9 +55,10 @@ class Column:
     unit: str
     style: Style
     kind: ColumnKind
-    text_share: float = 0.0
+    texts: int = 0
     example: str = ""
     header: str = ""
+    sampled: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,7 +287,9 @@ def _columns(
     for k, column in enumerate(cells):
         style = _style(column, order)
         kind = _kind(column, style)
-        columns.append(Column(k, paths[k], split[k][1] or below[k], style, *kind, header=split[k][0] or paths[k]))
+        columns.append(
+            Column(k, paths[k], split[k][1] or below[k], style, *kind, split[k][0] or paths[k], len(column.cells))
+        )
     return tuple(columns), "" if decimal or order[0].thousands else _unproven_cell(cells, columns)
 
 
@@ -365,22 +368,22 @@ def _has_leading_zero(cell: str, thousands: str) -> bool:
     return bool(sign) and whole.startswith("0")
 
 
-def _kind(column: _Cells, style: Style) -> tuple[ColumnKind, float, str]:
-    """Kind of a column by its filled cells, the share of cells that do not fit, and one of these."""
+def _kind(column: _Cells, style: Style) -> tuple[ColumnKind, int, str]:
+    """Kind of a column by its filled cells, the number of cells that do not fit, and one of these."""
     cells = column.cells
     if not cells:
-        return "blank", 0.0, ""
+        return "blank", 0, ""
     texts = [c for c, fits in zip(cells, column.fits(style), strict=True) if not fits and not is_bad(c)]
     allowed = max(int(len(cells) >= 3), len(cells) // 100)
     if len(texts) <= allowed and len(texts) < len(cells):
-        return "number", 0.0, ""
+        return "number", 0, ""
     shapes: tuple[tuple[ColumnKind, int], ...] = (
         ("stamp", sum(map(is_stamp, texts))), ("date", sum(map(is_date, texts))), ("clock", sum(map(is_clock, texts))),
     )  # fmt: skip
     kind, hits = max(shapes, key=lambda s: s[1])
     if hits and len(cells) - hits <= allowed:
-        return kind, 0.0, ""
-    return "text", len(texts) / len(cells), texts[0]
+        return kind, 0, ""
+    return "text", len(texts), texts[0]
 
 
 def lines_in(body: bytes, layout: Layout, start: int) -> int | None:

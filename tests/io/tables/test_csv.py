@@ -281,7 +281,7 @@ def test_read_keeps_the_order_asked_for(tmp_path):
 def test_text_columns_are_no_channels(read):
     log = read("t [s],v,state,gear\n" + table(40, line=lambda k: (str(k), "1", "OK", "P" if k % 4 == 0 else "3")))
     assert [i.path for i in log.infos] == ["v"]
-    assert log.noted('"gear"', "25 %", '"P"')
+    assert log.noted('"gear"', "10 of 40 cells looked at", '"P"')
     assert not log.noted('"state"')
 
 
