@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from typing import TYPE_CHECKING, Any, NoReturn, TextIO, cast
 
 import typer
 
@@ -21,7 +21,7 @@ from aqualog.guard.command import supervised
 if TYPE_CHECKING:
     from aqualog.face.result import Result
 
-__all__ = ["Console", "Heard", "clean", "clean_line", "guarded", "told_if_interrupted"]
+__all__ = ["Console", "Heard", "clean", "clean_line", "guarded", "leave_without_stdout", "told_if_interrupted"]
 
 _SHOWN_AT_ONCE = 20  # reasons why inputs failed
 _NAMED = 5  # inputs with one of them
@@ -267,6 +267,15 @@ class _StandardOutput:
             yield
         except OSError as error:
             raise OSError(error.errno, error.strerror, self.NAME) from error
+
+
+def leave_without_stdout(error: OSError) -> NoReturn:
+    """End where stdout cannot take what no command prints: help, the version."""
+    _silence()
+    if isinstance(error, BrokenPipeError):
+        raise SystemExit(int(ExitCode.DONE))
+    sys.stderr.write(f"error: {_line_of(OSError(error.errno, error.strerror, _StandardOutput.NAME))}\n")
+    raise SystemExit(int(ExitCode.FAILED))
 
 
 def _silence() -> None:

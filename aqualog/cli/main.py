@@ -64,7 +64,15 @@ def run() -> None:
         signal.signal(signal.SIGALRM, _raise)
         sys.unraisablehook = _lost
     begin_command()
-    app()
+    try:
+        try:
+            app()
+        finally:
+            sys.stdout.flush()  # help and version, which no command guards
+    except OSError as error:
+        from aqualog.cli.console import leave_without_stdout
+
+        leave_without_stdout(error)
 
 
 _AGAIN_S = 0.05

@@ -9,6 +9,7 @@ import pytest
 
 from aqualog.model import campaign
 from aqualog.model.programme import PROGRAMMES
+from tests.conftest import ROOT
 
 WAITING = """
 import sys, time
@@ -203,3 +204,20 @@ def test_what_is_told_before_a_command_begins_may_have_nowhere_to_go(streams):
         done = subprocess.run(["bash", "-c", f'"$@" {streams}', "bash", *command, argument], capture_output=True)
         assert done.returncode == code
         assert b"Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("arguments", [("--version",), ("--help",), ("detect", "--help")])
+def test_one_line_says_that_stdout_is_full(arguments):
+    command = ["bash", "-c", '"$@" >/dev/full', "bash", sys.executable, "-m", "aqualog", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr == "error: standard output: No space left on device. Try: another place for the output\n"
+
+
+def test_a_result_needs_stdout_or_a_file(tmp_path):
+    log = ROOT / "sample_logs" / "lane_drive.mf4"
+    command = ["bash", "-c", '"$@" >&-', "bash", sys.executable, "-m", "aqualog", "inspect", str(log)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: standard output is closed. Try: ")
+    assert subprocess.run([*command, "--csv", str(tmp_path / "c.csv")], capture_output=True).returncode == 0

@@ -287,9 +287,8 @@ def _columns(
     for k, column in enumerate(cells):
         style = _style(column, order)
         kind = _kind(column, style)
-        columns.append(
-            Column(k, paths[k], split[k][1] or below[k], style, *kind, split[k][0] or paths[k], len(column.cells))
-        )
+        header, unit = split[k]
+        columns.append(Column(k, paths[k], unit or below[k], style, *kind, header or paths[k], len(column.cells)))
     return tuple(columns), "" if decimal or order[0].thousands else _unproven_cell(cells, columns)
 
 
