@@ -242,9 +242,8 @@ def _nothing_mapped(paths: Sequence[Path], channels: int, notes: Sequence[str]) 
             expected="measured signals", hint=f"{hint}; `aqualog inspect LOG`",
         )  # fmt: skip
     return NothingMappedError(
-        f"none of {channels} channels is a signal that aqualog knows by name"
-        + (f" ({notes[0]})" if notes else "")
-        + ": missing omega_fl, omega_fr, omega_rl, omega_rr (wheel speeds), a_x and wheel torques",
+        f"none of {channels} channels is a signal that aqualog knows by name" + (f" ({notes[0]})" if notes else ""),
         where=", ".join(p.name for p in paths),
+        expected="names as omega_fl, omega_fr, omega_rl, omega_rr (wheel speeds), a_x and torque_fl, or a signal map",
         hint=MAP_HINT,
     )

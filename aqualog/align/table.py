@@ -271,7 +271,8 @@ def plan_drive(
             clean, own_notes = cleaners[name].cleaned(taken[name])
             notes += own_notes
             (cleaned if clean.span.samples else empty).append(clean)
-    if not cleaned:
+    is_usable = any(c.symbol.kind == "continuous" for c in cleaned)
+    if not cleaned or ((faults or empty) and not is_usable):
         raise _nothing_usable([*faults.values(), *(_why_empty(c.origin) for c in empty)], found)
     clocks = [(c.origin.file, taken[c.origin.symbol].absolute) for c in cleaned]
     with_speed = {c.origin.file for c in cleaned if c.origin.symbol in SPEEDS}

@@ -294,8 +294,8 @@ class _NamedFiles:
         self._seen.add((key, path))
         if not os.path.isfile(path):  # noqa: PTH113
             near = near_name(path)
-            told = f' (did you mean "{near}"?)' if near else ""
-            table.add(key, f"{key} = {name[:80]!r}: there is no such file{told}")
+            told = "there is no such file" + (f' (did you mean "{near}"?)' if near else "")
+            table.add(key, f"{key} = {name[:80]!r}: {'is a folder; a file is needed' if path.is_dir() else told}")
             return path
         try:
             _CHECKS[key](path)

@@ -132,8 +132,8 @@ def _file(
 
 def _of_file(name: str, kind: str, faults: FileFaults) -> Iterator[Finding]:
     if faults.truncated:
-        advice = "record again if the end matters; a logger that loses power needs a buffered supply"
-        yield Finding("lost", "truncated", name, "", "is cut off: its end is missing", advice)
+        advice = "copy the file again; if the original is so, a logger that loses power needs a buffered supply"
+        yield Finding("lost", "truncated", name, "", "is cut off or damaged: a part of it is missing", advice)
     if faults.lost_samples:
         what = f"{faults.lost_samples} {stored_in(kind)} could not be read"
         yield Finding("lost", "lost_samples", name, "", what, "copy the file again: the copy may be damaged",

@@ -173,3 +173,9 @@ def test_what_no_car_logs_is_said(tmp_path, change, words):
     said = found.stdout + found.stderr
     assert words in said
     assert "odd.csv" in said
+
+
+def test_units_that_nobody_knows_are_named(tmp_path):
+    rows = "\n".join(f"{i / 100},{i},{i},0" for i in range(99))
+    (tmp_path / "odd.csv").write_text(f"t [s],v_x [banana],omega_fl [banana],on_water\n{rows}\n")
+    assert 'omega_fl: unknown unit "banana"' in commands.one_error_line(commands.run("detect", tmp_path / "odd.csv"))

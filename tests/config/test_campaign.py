@@ -278,6 +278,7 @@ def test_tables_of_spreadsheets_say_the_same(folder, data):
      ("LOG,Tyre\na,s\n", ['unknown column "LOG" (did you mean "log"?)', 'unknown column "Tyre"', "no column log"]),
      ("log,zzz\na,1\n", ['unknown column "zzz" (columns of your own begin with x_)']),
      ("log,labels\na,lanes.csv\n", ['there is no such file (did you mean "lane.csv"?)']),
+     ("log,labels\na,.\n", ["'.': is a folder; a file is needed"]),
      ("log,,tyre\na,1,s\n", ["line 1: column 2 has no name"]),
      ("log,x_,tyre\na,1,s\n", ["column x_ has no name behind x_"]),
      ("log,tyre,tyre\na,1,s\n", ["column tyre stands twice"]),

@@ -55,4 +55,4 @@ def test_a_log_without_any_signal_still_says_so(tmp_path):
     (tmp_path / "a.csv").write_text("t,foo\n" + "".join(f"{0.1 * i},{i % 7}\n" for i in range(100)))
     done = run("detect", tmp_path / "a.csv")
     assert done.exit_code == 4
-    assert "none of 1 channels is a signal" in done.stderr
+    assert "by name; expected names as omega_fl" in done.stderr

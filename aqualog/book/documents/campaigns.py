@@ -307,7 +307,7 @@ MANIFEST = f.Document(
             f.text("state", "state", ("done", "failed", "to do")),
             f.text("reason", "why it failed; empty if it did not"),
             f.text("key", "name of its files in the store"),
-            f.flag("truncated", "whether a file of the log ends before its end"),
+            f.flag("truncated", "whether a file of the log is cut off or damaged: a part is missing"),
         )),
     ),
     files=("NAME.store/manifest.json",),

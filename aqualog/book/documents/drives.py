@@ -73,7 +73,7 @@ DETECT = f.Document(
         f.obj("quality", "what was wrong with the log", (
             f.count("dropped_samples", "samples that were left out"),
             f.count("time_jumps", "jumps of the time"),
-            f.flag("truncated", "whether a file ends before its end"),
+            f.flag("truncated", "whether a file is cut off or damaged: a part is missing"),
             f.flag("unfinalised", "whether the logger has not finished a file"),
             f.count("frozen_samples", "samples of sensors that stand still; left out"),
             *f.FAULTS,

@@ -51,7 +51,7 @@ _RUNS = Table(
         count("full_episodes", "those of them with full aquaplaning"),
         count("events_DETECTOR", "events of each detector; null where it could not run"),
         text("unavailable", "detectors that could not run"),
-        flag("truncated", "whether a file ends before its end"),
+        flag("truncated", "whether a file is cut off or damaged: a part is missing"),
         count("dropped_samples", "samples that were left out"),
         count("time_jumps", "jumps of the time"),
         count("lost_in_files", "samples that the reader lost"),

@@ -97,7 +97,7 @@ def _lane_beyond(info: RunInfo) -> str:
 
 
 _KINDS: tuple[tuple[str, str, str, _Test], ...] = (
-    ("loss", "log cut off", "its end is missing", lambda r: "cut off" if _q(r, "truncated") else ""),
+    ("loss", "log cut off or damaged", "a part is missing", lambda r: "incomplete" if _q(r, "truncated") else ""),
     ("loss", "samples lost in damaged files", "", _times("lost_in_files", "lost")),
     ("loss", "samples dropped", "not used", _times("dropped_samples", "dropped")),
     ("loss", "time jumps", "the log's clock is uneven", _times("time_jumps", "")),

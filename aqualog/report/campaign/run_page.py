@@ -137,7 +137,7 @@ def _problems(info: RunInfo) -> list[str]:
     if not info.is_done:
         return []
     q = info.about["quality"]
-    found = ["the log is cut off: its end is missing"] if q["truncated"] else []
+    found = ["the log is cut off or damaged: a part of it is missing"] if q["truncated"] else []
     found += [f"{q[n]} {n.replace('_', ' ')}" for n in q if n != "truncated" and q[n]]
     found += ["the position of the lane is not known: figures over speed skip this run"] if not info.water_from else []
     found += [f"{detector_name(d)} not judged (needs {', '.join(m)})" for d, m in info.about["unavailable"].items()]

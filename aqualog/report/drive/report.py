@@ -221,7 +221,7 @@ def _utc(start_ns: int) -> str:
 def _problems(result: DriveResult) -> list[str]:
     """Problems of the data that limit how far the page can be trusted."""
     quality = result.signals.quality
-    found = ["The log is cut off: its end is missing."] if quality.truncated else []
+    found = ["The log is cut off or damaged: a part of it is missing."] if quality.truncated else []
     if quality.dropped_samples:
         lost = f", {quality.lost_in_files} of them lost in damaged files" if quality.lost_in_files else ""
         found.append(f"{quality.dropped_samples} samples were not used{lost}.")

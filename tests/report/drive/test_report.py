@@ -192,7 +192,7 @@ def test_problems_are_in_a_box(short):
     quality = Quality(truncated=True, dropped_samples=9, lost_in_files=4)
     cut = replace(short, signals=replace(short.signals, quality=quality))
     words = Reader(drive_page(cut, title="t")).words
-    assert "The log is cut off" in words
+    assert "The log is cut off or damaged: a part of it is missing." in words
     assert "9 samples were not used, 4 of them lost in damaged files." in words
     good = replace(short, signals=replace(short.signals, quality=Quality()))
     assert 'id="problems"' not in drive_page(good, title="t")
