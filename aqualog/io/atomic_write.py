@@ -6,8 +6,7 @@ import errno
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from threading import Lock
@@ -54,16 +53,23 @@ def folder_within(folder: Path) -> Iterator[Path]:
                 shutil.rmtree(temporary, ignore_errors=True)
 
 
-def move_together(files: Iterable[tuple[Path, Path]]) -> None:
-    """Move files to their places in this order. An interrupt waits: it would leave a mixture of old and new."""
-
-    def move() -> None:
-        for made, path in files:
-            path.parent.mkdir(exist_ok=True)
-            made.replace(path)
-
-    with ThreadPoolExecutor(1) as mover:  # an interrupt comes to the main thread, which then waits for this one
-        mover.submit(move).result()
+def move_together(files: Sequence[tuple[Path, Path]], gone: Iterable[Path] = ()) -> None:
+    """Move files to their places in this order, and remove others. An interrupt waits: it would leave a mixture."""
+    interrupt: KeyboardInterrupt | None = None
+    is_done = False
+    while not is_done:
+        try:
+            for made, path in files:
+                path.parent.mkdir(exist_ok=True)
+                if interrupt is None or made.exists():
+                    made.replace(path)
+            for path in gone:
+                path.unlink(missing_ok=True)
+            is_done = True
+        except KeyboardInterrupt as error:
+            interrupt = error
+    if interrupt is not None:
+        raise interrupt
 
 
 @contextmanager

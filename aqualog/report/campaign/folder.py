@@ -72,10 +72,9 @@ def write_report(data: CampaignData, findings: Findings, folder: Path, *, report
     """Write the report; number of files. `check_folder` must have been asked before.
 
     All files are complete before the first takes its place, and the page comes last, so that its links work. Pages of
-    an earlier report that have no run any more are removed; files that are not of a report stay.
+    an earlier report that have no run any more are removed, and files that are not of a report stay.
     """
     pages = page_names([r.name for r in data.runs])
-    earlier = _earlier(folder)
     own = sorted({*pages, *(f"data/{t}" for t in _TABLES), "plotly.min.js"})
     with folder_within(folder) as made:
         facts = _write_pages(data, made, pages, report)
@@ -83,13 +82,11 @@ def write_report(data: CampaignData, findings: Findings, folder: Path, *, report
             write_text(made / "data" / name, _clean(text))
         write_text(made / "plotly.min.js", plotly_js())
         write_text(made / "index.html", _clean(campaign_page(data, findings, facts, pages)))
-        _mark(made / "both", sorted({*own, "index.html", *earlier}))
-        _mark(made / MARK, sorted({*own, "index.html"}))
-        names = {"both": MARK} | {name: name for name in (*own, "index.html", MARK)}
-        move_together((made / name, folder / place) for name, place in names.items())
-    for name in set(earlier) - {*own, "index.html"}:
-        (folder / name).unlink(missing_ok=True)
-    return len(own) + 2
+        _mark(made / MARK, sorted([*own, "index.html"]))
+        own += ["index.html", MARK]
+        gone = [folder / name for name in _earlier(folder) if name not in own]
+        move_together([(made / name, folder / name) for name in own], gone)
+    return len(own)
 
 
 def _write_pages(data: CampaignData, folder: Path, pages: Sequence[str], report: Report) -> list[RunFacts | None]:

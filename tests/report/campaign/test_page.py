@@ -1,12 +1,10 @@
 """The report of a campaign: what it holds, that names stay text, that the folder is whole and the same each time."""
 
-import _thread
 import csv
 import json
 import math
 import re
 import shutil
-import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -357,21 +355,25 @@ def test_a_report_that_is_broken_off_leaves_what_was_there(case, findings, folde
     assert out.exists() == has_earlier
 
 
-def test_an_interrupt_waits_until_all_files_are_in_their_places(tmp_path):
-    made = [tmp_path / str(i) for i in range(20)]
-    for path in made:
-        path.write_text("new")
+@pytest.mark.parametrize("is_before", [False, True])
+def test_an_interrupt_waits_until_all_files_are_in_their_places(tmp_path, monkeypatch, is_before):
+    pairs = [(tmp_path / str(i), tmp_path / "out" / str(i)) for i in range(9)]
+    count, move = iter(range(99)), Path.replace
+    for made, _ in pairs:
+        made.write_text("new")
 
-    def pairs():
-        for i, path in enumerate(made):
-            yield path, tmp_path / "out" / path.name
-            if i == 5:
-                _thread.interrupt_main()
-                time.sleep(0.2)
+    def interrupted(made, path):
+        n = next(count)
+        if n == 4 and is_before:
+            raise KeyboardInterrupt
+        move(made, path)
+        if n == 4:
+            raise KeyboardInterrupt
 
+    monkeypatch.setattr(Path, "replace", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        move_together(pairs())
-    assert len(list((tmp_path / "out").iterdir())) == 20
+        move_together(pairs, [tmp_path / "old"])
+    assert len(files_in(tmp_path / "out")) == 9
 
 
 def test_folders_of_other_things_are_refused(tmp_path):
