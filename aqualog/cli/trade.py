@@ -159,7 +159,7 @@ def watch(
         found = watch(
             folder, campaign, kind, by=by, limits=limits, page=page, once=once, every_s=every, say=say, progress=hear
         )
-    notes = [f"the page is {page}"]
+    notes = [f"the page is {found.page}"] if found.page is not None else []
     if not once:
         return Output(found, notes, code=int(ExitCode.INTERRUPTED))
     return _ended(run, kind, found, notes)

@@ -190,7 +190,9 @@ def no_vehicle(other: str) -> ConfigError:
 _FORCE = "--force (from Python force=True) to overwrite, or another name"
 
 
-def refuse_existing(paths: Iterable[Path], *, force: bool, sources: Iterable[Path] = ()) -> None:
+def refuse_existing(
+    paths: Iterable[Path], *, force: bool, sources: Iterable[Path] = (), hint: str = _FORCE
+) -> None:  # fmt: skip
     """Stop before any work if a result would overwrite something; a source is not overwritten even by force.
 
     A source that is a folder stands for the files in it. Nor may two results have one name.
@@ -213,7 +215,7 @@ def refuse_existing(paths: Iterable[Path], *, force: bool, sources: Iterable[Pat
         if path.is_dir():
             raise ConfigError("is a folder", where=str(path), expected="a file to write")
         if os.path.lexists(path) and not force:  # also a link that leads nowhere
-            raise ConfigError("exists already", where=str(path), hint=_FORCE)
+            raise ConfigError("exists already", where=str(path), hint=hint)
         _check_folder(path)
 
 

@@ -6,6 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aqualog.core.errors import ConfigError
@@ -33,11 +34,12 @@ _INSIDE = ("onset_missing", "curve")  # parts of a row that are no cells of a ta
 class TyreTest(Result):
     """A tyre test: every run with its value and whether it counts, every set with its mean and index.
 
-    `test` holds the records, `name` is that of the campaign.
+    `test` holds the records, `name` is that of the campaign, `page` the page that a watch has written.
     """
 
     test: TradeTest
     name: str
+    page: Path | None = None
 
     @cached_property
     def document(self) -> dict[str, Any]:

@@ -91,7 +91,7 @@ def watch(
     if once and not place.is_dir():
         raise ConfigError("is no folder", where=str(place), expected="a folder with logs")
     if target is not None:
-        refuse_existing([target], force=_is_own(target), sources=[*own.sources])
+        refuse_existing([target], force=_is_own(target), sources=[*own.sources], hint="another name for the page")
     session = _Session(place, own, kind_of(kind), tuple(split(by)), used, hear, say, target)
     try:
         session.step()
@@ -106,7 +106,8 @@ def watch(
     assert session.last is not None
     found = session.last
     return TyreTest(
-        found.test, own.name, has_loss=bool(found.failed),
+        found.test, own.name, target if session.is_written else None,
+        has_loss=bool(found.failed) or not (target is None or session.is_written),
         notes=tuple(f"{name}: the same log as {other}" for name, other in found.same.items()),
         sources=sources_of(own.sources, limits),
     )  # fmt: skip
@@ -131,7 +132,7 @@ class _Session:
             Request(kind, limits, whole_only=True),
         )  # fmt: skip
         self.last: Watched | None = None
-        self.is_changed = True
+        self.is_changed, self.is_written = True, False
         self._written_at = -_HEARTBEAT_S
         self._said: set[str] = set()
 
@@ -167,8 +168,9 @@ class _Session:
             write_whole(self._page, page_file(lambda: page))
         except AqualogError as error:  # its place may be of the network, too
             self.tell_once(error.line())
+            self.is_written = False
             return
-        self.is_changed, self._written_at = False, now
+        self.is_changed, self.is_written, self._written_at = False, True, now
 
     def _options(self) -> Options:
         from aqualog.campaign.bins import check_plan

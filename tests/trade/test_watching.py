@@ -317,19 +317,24 @@ def test_once(tmp_path, stock, monkeypatch):
     assert commands.one_error_line(done).startswith("error: b.parquet: ")
     assert done.stdout.startswith("a.parquet: 74.0 km/h, valid")
     (tmp_path / "mine.html").write_text("mine")
-    assert commands.run(*given, "-o", tmp_path / "mine.html").exit_code == 2
+    refused = commands.one_error_line(commands.run(*given, "-o", tmp_path / "mine.html"))
+    assert refused.endswith("mine.html: exists already. Try: another name for the page")
     assert (tmp_path / "mine.html").read_text() == "mine"
 
 
-def test_errors(tmp_path):
+def test_errors(tmp_path, monkeypatch):
     track = Track(tmp_path)
     assert "no --campaign" in commands.run("watch", track.logs).stderr
     with pytest.raises(ConfigError, match="is no folder"):
         aq.watch(tmp_path / "nowhere", tmp_path / "campaign.toml", once=True)
     with pytest.raises(ConfigError, match='no test "sideways"'):
         aq.watch(track.logs, tmp_path / "campaign.toml", "sideways")
-    empty = commands.run("watch", track.logs, "--campaign", tmp_path / "campaign.toml", "--once")
+    given = ("watch", track.logs, "--campaign", tmp_path / "campaign.toml", "--once")
+    empty = commands.run(*given)
     assert empty.exit_code == 4
+    assert "the page is" in empty.stderr
+    monkeypatch.setattr("aqualog.report.page.write_page", lambda *_: (tmp_path / "gone").stat())  # an OSError
+    assert "the page is" not in commands.run(*given).stderr
 
 
 def test_ctrl_c_ends_it_cleanly(tmp_path, stock):
