@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 from aqualog.align.mapping import MAP_HINT, SignalMap, resolve
 from aqualog.align.table import Found, build_signals
 from aqualog.align.windows import LongDrive, NotInPiecesError, long_drive
-from aqualog.core.errors import SignalError, listed
+from aqualog.core.errors import ConfigError, SignalError, listed
 from aqualog.core.records import FileFaults, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.io.open_log import DriveLog
@@ -219,6 +219,9 @@ def find_channels(log: DriveLog, signal_map: SignalMap, wanted: Callable[[str], 
     """
     channels = log.channels()  # first: what is damaged is told then
     notes = [n for f in log.faults for n in f.notes if f.truncated or f.lost_samples or "CAN frames" in n]
+    if signal_map.time_channel and all(any("no time channel" in n for n in f.notes) for f in log.faults):
+        what = f'no column is called "{signal_map.time_channel}"'
+        raise ConfigError(what, where="[time] channel", expected="a column of the log", hint="`aqualog inspect LOG`")
     try:
         found = {s: hit for s, hit in resolve(channels, signal_map).items() if wanted(s)}
     except SignalError as error:

@@ -141,7 +141,7 @@ class Run:
         from aqualog.face.cache import NoCacheFolderError, cache_of_user
 
         try:
-            return cache_of_user(tell=self.console.detail)
+            return cache_of_user(tell=self.console.note if self.cache else self.console.detail)
         except NoCacheFolderError:
             self.console.detail("there is no home folder to keep signals in; AQUALOG_CACHE names another")
             return None

@@ -228,11 +228,11 @@ def test_hashes_that_are_none_are_not_believed(known, log, place):
     assert len(place.kept()) == 1
 
 
-def test_a_folder_that_cannot_be_made_is_told_with_v_only(log, tmp_path):
+def test_a_folder_that_cannot_be_made_is_told_with_v_or_where_it_is_asked_for(log, tmp_path):
     (tmp_path / "file").write_text("")
     given = ["slip-slope", log, "--vehicle", SAMPLES / "vehicle.toml", "--json"]
     plain = run(*given)
-    for more in ([], ["-v"]):
+    for more in ([], ["-v"], ["--cache"]):
         result = run(*given, *more, AQUALOG_CACHE=str(tmp_path / "file" / "below"))
         assert (result.exit_code, result.stdout) == (plain.exit_code, plain.stdout)
         assert ("cannot be written" in result.stderr) == bool(more)

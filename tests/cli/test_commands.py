@@ -296,6 +296,11 @@ def test_time_column_of_the_map(tmp_path):
     result = run("detect", tmp_path / "x.csv", "--signals", tmp_path / "m.toml", "--json")
     assert result.exit_code == 0, result.stderr
     assert json.loads(result.stdout)["duration_s"] == pytest.approx(5.0)
+    (tmp_path / "m.toml").write_text('[time]\nchannel = "clock"\n[signals]\nomega_fl = "w"\n')
+    frame.rename({"clk": "t"}).write_csv(tmp_path / "x.csv")
+    wrong = run("detect", tmp_path / "x.csv", "--signals", tmp_path / "m.toml")
+    assert wrong.exit_code == 2
+    assert '[time] channel: no column is called "clock"' in wrong.stderr
 
 
 @pytest.mark.parametrize("extra", [[], ["--force"]])

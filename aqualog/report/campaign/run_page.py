@@ -18,13 +18,22 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import Event, FloatArray
 from aqualog.report.campaign.full_rate import dense_of
 from aqualog.report.campaign.labels import key_title, value_text
-from aqualog.report.drive.judged import EPISODE_HEADS, FOLDED, card_lines, episode_cells, folded_line, headline, level
+from aqualog.report.drive.judged import (
+    EPISODE_HEADS,
+    FOLDED,
+    card_lines,
+    detections_line,
+    episode_cells,
+    folded_line,
+    headline,
+    level,
+)
 from aqualog.report.drive.report import EVENT_HEADS, by_importance, event_cells
 from aqualog.report.page import report_page
 from aqualog.report.reduce import LONG_S, Budget, Plan, make_plan, spans_of
 from aqualog.report.sections import Cell, Code, Headline, Line, Lines, Para, Part, Report, Section, Stack, Table
 from aqualog.report.theme import WHEEL_COLOURS, detector_colour
-from aqualog.report.values import KMH, counted, cut, number, place, upper_first
+from aqualog.report.values import KMH, cut, number, place, upper_first
 from aqualog.report.wording import detector_name
 
 __all__ = ["BEHIND_S", "EventCount", "RunFacts", "command_of", "facts_of", "run_page"]
@@ -64,7 +73,7 @@ def run_page(
     judgement = info.judgement
     main = [e for e in judgement.episodes if e.kind not in FOLDED]
     fold = "; ".join([*(folded_line(k, judgement.of(k)) for k in FOLDED if judgement.of(k)),
-                      f"{counted(len(info.events), 'detection')}, one by one"])  # fmt: skip
+                      detections_line(judgement, len(info.events))])  # fmt: skip
     drawn, island = _over_time(info, samples, full) if samples is not None else ([], {})
     verdict = headline(judgement, doubted=bool(info.checks)) if info.is_done else "No results"
     sections = [

@@ -18,6 +18,7 @@ from aqualog.report.drive.judged import (
     EPISODE_HEADS,
     FOLDED,
     card_lines,
+    detections_line,
     episode_cells,
     folded_line,
     headline,
@@ -33,7 +34,7 @@ from aqualog.report.page import report_page
 from aqualog.report.reduce import DRIVE, LONG_S, POINTS, Plan, make_plan
 from aqualog.report.sections import Cell, Figures, Headline, Line, Lines, Para, Part, Report, Section, Stack, Table
 from aqualog.report.theme import WHEEL_COLOURS
-from aqualog.report.values import counted, number, place, pretty_unit
+from aqualog.report.values import number, place, pretty_unit
 from aqualog.report.wording import detector_name, evidence_parts, not_judged, speed_kmh
 
 __all__ = ["EVENT_HEADS", "by_importance", "drive_page", "drive_report", "event_cells", "lacking"]
@@ -111,7 +112,7 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
             replace(table, where="page"),
             Table(EVENT_HEADS, [c for i, c in enumerate(events) if i not in folded], "events", (0, 1, 5, 8), wide=(8,),
                   brief=(8,), where="text"),
-        ], "event-section", _HINT, fold=f"{counted(len(events), 'detection')}, one by one"),
+        ], "event-section", _HINT, fold=detections_line(judgement, len(events))),
         *drawn,
         Section("The drive from above", [Figures(["route"] if route else []), Para(_ROUTE)] if route else [],
                 "route-section", where="page"),

@@ -16,7 +16,7 @@ import pytest
 import aqualog.report
 from aqualog.core.judgement import Episode, Judgement
 from aqualog.core.records import Margin, Quality, Unavailable
-from aqualog.report.drive.judged import judged_by
+from aqualog.report.drive.judged import detections_line, judged_by
 from aqualog.report.drive.report import FIRST_EVENTS, MOST_ROWS, drive_page, drive_report, event_cells
 from aqualog.report.page import write_page
 from aqualog.report.reduce import POINTS
@@ -180,6 +180,7 @@ def test_lock_ups_are_folded(short):
     page = drive_page(drive, title="t")
     assert '<details class="fold"><summary>Braking slip: 40 episodes, 40 detections</summary>' in page
     assert '<details class="fold"><summary>40 detections, one by one</summary>' in page
+    assert detections_line(drive.judgement, 43) == "43 detections, one by one, 3 in no episode"
     text = report_text(drive_report(drive))
     assert text.startswith("No aquaplaning\n")
     assert "Braking slip: 40 episodes, 40 detections; --json lists them" in text
