@@ -213,6 +213,7 @@ class SignalCache:
 
     def _tell_unwritable(self, error: OSError) -> None:
         self._tell(f"the cache {self.folder} cannot be written ({error.strerror or error}); nothing is kept")
+        self._tell = lambda _: None  # once
 
 
 def cache_folder() -> Path:

@@ -132,9 +132,7 @@ def _from_slopes(
     L = np.array([r.contact_ratio for r in told])
     ends = np.array([contact(r, dry, np.array(r.slope_ci), np.array(dry.slope)) for r in told])
     sigma = np.maximum((ends[:, 1] - ends[:, 0]) / 4.0, SIGMA_MIN)
-    least = round(100 * float(L.min()))
-    lost = f"contact down to {least} %" if least < 100 else "no contact lost"
-    on += f", {3.6 * v[0]:.0f} to {3.6 * v[-1]:.0f} km/h, {lost}"
+    on += f", {3.6 * v[0]:.0f} to {3.6 * v[-1]:.0f} km/h, contact down to {100 * min(L.min(), 1.0):.0f} %"
     best, exponent = fit_contact(v, L[None], sigma)
     lack = _lack(v, L, sigma, float(best[0]), float(exponent[0]))
     k_dry = _drawn(dry, rng)

@@ -50,7 +50,7 @@ def init(run: Run, folder: Path, out: Path) -> Output:
 
     with run.hearing() as hear:
         found = Campaign.propose(folder, out, vehicle=run.vehicle, dbc=run.dbc, force=run.force, progress=hear)
-    return Output(found, found.notes, files=found.files_there())
+    return Output(found, found.notes, files={out.parent / n: write for n, write in found.files().items()})
 
 
 @command(
@@ -183,7 +183,8 @@ def _binned(
         return run.of_runs(runs)
     with run.hearing() as hear:
         found = find(runs, hear)
-    files = {} if table is None else {table: found.table_file(table)}
+    kinds = {Path(name).suffix: write for name, write in found.files().items()}
+    files = {} if table is None else {table: kinds[table.suffix.lower()]}
     return run.of_runs(runs, result=found, notes=[*found.notes, *(f"the table is {p}" for p in files)], files=files)
 
 

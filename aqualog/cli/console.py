@@ -208,7 +208,8 @@ def guarded(*, debug: bool) -> Iterator[None]:
     except Exception as error:
         if debug:
             traceback.print_exc()
-        sys.stderr.write(f"error: {_line_of(error)}\n")
+        if not getattr(error, "is_heard", False):
+            sys.stderr.write(f"error: {_line_of(error)}\n")
         code = error.exit_code if isinstance(error, AqualogError) else ExitCode.FAILED
         raise typer.Exit(int(code)) from error
 

@@ -36,20 +36,14 @@ def calibrate(run: Run, out: Path | None, wet: bool, fix: list[str] | None, acce
       aqualog calibrate --wet pass*.mf4 --vehicle car.toml --fix tread=1.6 --fix pressure=2.2 -o wet.toml
       aqualog calibrate monday/ tuesday/ --vehicle car.toml --signals map.toml --page calibration.html
     """
-    from aqualog.core.errors import ExitCode
     from aqualog.face.calibrate import calibrate
-    from aqualog.face.drives import NothingUsableError, grouped
+    from aqualog.face.drives import grouped
 
     run.need_vehicle("which axle is driven, radii, axle distances")
     fixed = _fixed(fix or [], wet=wet)
     drive = run.drive([p for p in (out, page) if p is not None])
-    try:
-        with run.hearing("nothing was written") as hear:
-            result = calibrate(
-                grouped(run.logs, drive), drive.vehicle, fix=fixed, accept=accept, wet=wet, progress=hear
-            )
-    except NothingUsableError:  # each reason was reported
-        return Output(code=int(ExitCode.NOTHING_USABLE))
+    with run.hearing("nothing was written") as hear:
+        result = calibrate(grouped(run.logs, drive), drive.vehicle, fix=fixed, accept=accept, wet=wet, progress=hear)
     files = files_at(result, {"calibrated.toml": out, "calibration.html": page})
     return Output(result, [*result.notes, *(f"written: {path}" for path in files)], files=files)
 
@@ -127,10 +121,10 @@ def diagnose(
 
 
 def _drives(run: Run, holdout: list[str], out: Path | None, page: Path | None, options: dict[str, Any]) -> Output:
-    from aqualog.core.errors import ConfigError, ExitCode
+    from aqualog.core.errors import ConfigError
     from aqualog.face.arguments import expand, list_files
     from aqualog.face.diagnose import diagnose
-    from aqualog.face.drives import NothingUsableError, grouped
+    from aqualog.face.drives import grouped
 
     run.need_vehicle("it is what the simulation believes")
     unseen = expand(holdout)
@@ -141,14 +135,11 @@ def _drives(run: Run, holdout: list[str], out: Path | None, page: Path | None, o
         raise ConfigError(
             "no such file or folder", where=f"--holdout {missing}", expected="a drive to measure the gain on"
         )
-    try:
-        with run.hearing("nothing was written") as hear:
-            result = diagnose(
-                grouped(run.logs, drive), drive.vehicle, holdout=grouped(holdout, drive), model=run.model,
-                views=page is not None, progress=hear, **options,
-            )  # fmt: skip
-    except NothingUsableError:  # each reason was reported
-        return Output(code=int(ExitCode.NOTHING_USABLE))
+    with run.hearing("nothing was written") as hear:
+        result = diagnose(
+            grouped(run.logs, drive), drive.vehicle, holdout=grouped(holdout, drive), model=run.model,
+            views=page is not None, progress=hear, **options,
+        )  # fmt: skip
     return _output(result, out, page)
 
 
@@ -197,21 +188,17 @@ def validate(run: Run, method: str, boundaries: Path | None, why: bool, out: Pat
       aqualog validate run1.mf4 run2.mf4 run3.mf4 --vehicle car.toml -o validity.html
       aqualog validate drive.mf4 --vehicle car.toml --method 18571 --boundaries own.toml --json
     """
-    from aqualog.core.errors import ExitCode
-    from aqualog.face.drives import NothingUsableError, grouped
+    from aqualog.face.drives import grouped
     from aqualog.face.validate import validate
 
     run.need_vehicle("it is what the simulation believes")
     others = [p for p in (run.model, boundaries) if p is not None]
     drive = run.drive([out] if out is not None else [], others=others)
-    try:
-        with run.hearing("nothing was written") as hear:
-            result = validate(
-                grouped(run.logs, drive), drive.vehicle, method=method, boundaries=boundaries, model=run.model,
-                why=why, progress=hear,
-            )  # fmt: skip
-    except NothingUsableError:  # each reason was reported
-        return Output(code=int(ExitCode.NOTHING_USABLE))
+    with run.hearing("nothing was written") as hear:
+        result = validate(
+            grouped(run.logs, drive), drive.vehicle, method=method, boundaries=boundaries, model=run.model,
+            why=why, progress=hear,
+        )  # fmt: skip
     files = files_at(result, {"validation.html": out})
     return Output(result, [*result.notes, *(f"the page is {path}" for path in files)], files=files)
 

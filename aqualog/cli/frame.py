@@ -29,9 +29,6 @@ _GROUPS = {"data": ("csv", "decimal_comma:tables", "json")}
 
 Files = Mapping[Path, Callable[[Path], None]]
 
-_KEPT = {"store:out", "out:watch"}
-"""Options of commands that always write their result."""
-
 BATCH_BROKEN_OFF = "the logs that are done are kept, the same command goes on with the rest"
 
 
@@ -204,13 +201,10 @@ class Run:
             raise ConfigError("--decimal-comma without --csv", expected="--csv FILE.csv, the tables that it is for")
 
     def finish(self, output: Output, *, has_files: bool = False) -> int:
-        """Write the files that were asked for, print what a command leaves, and return its exit code.
-
-        `has_files`: the command has written its result, which may then have no other place.
-        """
+        """Write what was asked for, unless it `has_files`, print what a command leaves, and return its exit code."""
         from aqualog.core.errors import AqualogError, ExitCode
         from aqualog.face.arguments import refuse_existing, write_together
-        from aqualog.guard.streams import has_stdout
+        from aqualog.guard.streams import CLOSED
 
         result = output.result
         tables: Files = {}
@@ -219,7 +213,7 @@ class Run:
         refuse_existing([*output.files, *tables], force=True)  # no two results with one name
         write_together({**output.files, **tables})
         if result is not None:
-            if not (has_stdout() or has_files or output.files or tables):
+            if 1 in CLOSED and not (has_files or output.files or tables):
                 raise AqualogError("standard output is closed", hint="a place for the output, or a file for the result")
             self.console.data(result, as_json=self.json, text=output.text)
         for text in (*output.notes, *([f"tables: {', '.join(map(str, tables))}"] if tables else [])):
@@ -266,7 +260,8 @@ def command(
                 if "csv" in given:
                     run.check_csv(v for n, v in given.items() if n != "csv")
                 output = body(run, **{n: given[n] for n in own if n != "run"})
-                has_files = bool(_KEPT & {*taken}) or any(given.get(n) is not None for n in ("out", "write"))
+                is_kept = bool({"store:out", "out:watch"} & {*taken})  # these commands always write their result
+                has_files = is_kept or any(given.get(n) is not None for n in ("out", "write"))
                 code = run.finish(output, has_files=has_files)
             if code:
                 raise typer.Exit(code)

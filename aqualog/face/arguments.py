@@ -190,9 +190,7 @@ def no_vehicle(other: str) -> ConfigError:
 _FORCE = "--force (from Python force=True) to overwrite, or another name"
 
 
-def refuse_existing(
-    paths: Iterable[Path], *, force: bool, sources: Iterable[Path] = (), hint: str = _FORCE
-) -> None:  # fmt: skip
+def refuse_existing(paths: Iterable[Path], *, force: bool, sources: Iterable[Path] = (), hint: str = _FORCE) -> None:
     """Stop before any work if a result would overwrite something; a source is not overwritten even by force.
 
     A source that is a folder stands for the files in it. Nor may two results have one name.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -60,11 +60,7 @@ class _Binned(Result):
         """Write the rows as one table: .csv or .parquet."""
         target = file_of(path, "path")
         check_table(target)
-        return self._write_to(target, self.table_file(target), force=force)
-
-    def table_file(self, path: Path) -> Callable[[Path], None]:
-        """Return what writes the rows in the format of a path."""
-        return partial(_write, self.document["rows"], path.suffix.lower())
+        return self._write_to(target, partial(_write, self.document["rows"], target.suffix.lower()), force=force)
 
     def files(self) -> Writers:
         """Return the document and its rows as CSV and Parquet."""

@@ -27,6 +27,8 @@ _Found = TypeVar("_Found")
 class NothingUsableError(SignalError):
     """None of the drives can be used. `reasons` has a line for each; the listener has heard them."""
 
+    is_heard = True
+
     def __init__(self, reasons: Sequence[str]) -> None:
         self.reasons = tuple(reasons)
         super().__init__(f"no drive can be used: {'; '.join(reasons)}")

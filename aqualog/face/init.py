@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from aqualog.core.errors import AqualogError, ExitCode, SignalError
 from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import Vehicle
-from aqualog.face.arguments import expand, file_of, refuse_existing, write_together
+from aqualog.face.arguments import expand, file_of, refuse_existing
 from aqualog.face.drive import DriveLike, drive_of, sources_of
 from aqualog.face.inspect import Contents, inspect, proposal_words
 from aqualog.face.listener import Progress, listener
@@ -190,10 +190,7 @@ class Start(Result):
 
     def write_files(self, *, force: bool = False) -> tuple[Path, ...]:
         """Write the files into the folder that `init` was given: all of them or none."""
-        files = {self.folder / n: write for n, write in self.files().items()}
-        refuse_existing(files, force=force, sources=self.sources)
-        write_together(files)
-        return tuple(files)
+        return self.save(self.folder, force=force)
 
 
 def init(

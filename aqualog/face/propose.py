@@ -154,11 +154,7 @@ class Proposal(Result, Generic[AnyCampaign]):
 
     def files(self) -> Writers:
         """Return the campaign file and the files beside it, by name."""
-        return {p.name: write for p, write in self.files_there().items()}
-
-    def files_there(self) -> Mapping[Path, Callable[[Path], None]]:
-        """Return the files where `propose` was asked to put them."""
-        return {p: text_file(partial(str, text)) for p, text in self.texts.items()}
+        return {p.name: text_file(partial(str, text)) for p, text in self.texts.items()}
 
     def write(self) -> AnyCampaign:
         """Write the files where `propose` was asked to put them, and return the campaign.
@@ -173,7 +169,7 @@ class Proposal(Result, Generic[AnyCampaign]):
 
     def write_files(self) -> None:
         """Write the files where `propose` was asked to put them, all of them or none; the campaign file last."""
-        write_together(self.files_there())
+        write_together({self.out.parent / name: write for name, write in self.files().items()})
 
 
 def propose(

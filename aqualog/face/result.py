@@ -7,6 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from operator import methodcaller
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -129,9 +130,7 @@ class Result(ABC):
         write_together(files)
         return tuple(files)
 
-    def csv_files(
-        self, path: PathLike, *, decimal_comma: bool = False, force: bool = False
-    ) -> Mapping[Path, Callable[[Path], None]]:
+    def csv_files(self, path: PathLike, *, decimal_comma: bool, force: bool) -> Mapping[Path, Callable[[Path], None]]:
         """Return the files of `write_csv`, each with its writer, once they are checked."""
         from aqualog.report.spreadsheet import csv_bytes
 
@@ -143,7 +142,7 @@ class Result(ABC):
             if frame.columns
         }
         refuse_existing(frames, force=force, sources=self.sources)
-        return {p: _bytes_file(csv_bytes(frame, decimal_comma=decimal_comma)) for p, frame in frames.items()}
+        return {p: methodcaller("write_bytes", csv_bytes(f, decimal_comma=decimal_comma)) for p, f in frames.items()}
 
     def _write_as(self, name: str, path: PathLike, *, force: bool) -> Path:
         """Write the file that `save` calls `name` to a path of the user's choice."""
@@ -208,13 +207,6 @@ def text_file(text: Callable[[], str]) -> Callable[[Path], None]:
 
     def write(path: Path) -> None:
         path.write_text(text(), encoding="utf-8")
-
-    return write
-
-
-def _bytes_file(data: bytes) -> Callable[[Path], None]:
-    def write(path: Path) -> None:
-        path.write_bytes(data)
 
     return write
 

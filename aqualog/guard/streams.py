@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
 
-__all__ = ["ForeignStderr", "PanicFilter", "SafeStderr", "has_stdout", "open_streams"]
+__all__ = ["CLOSED", "ForeignStderr", "PanicFilter", "SafeStderr", "open_streams"]
 
 _PANIC = re.compile(rb"thread '.*'(?: \(\d+\))? panicked at ")
 _MORE = re.compile(rb"[ \t]+\S|note: run with `RUST_BACKTRACE|stack backtrace:")
@@ -37,12 +37,8 @@ class SafeStderr(io.TextIOWrapper):
         return cls(io.BufferedWriter(raw), encoding=encoding, errors="replace", line_buffering=True)
 
 
-_closed: set[int] = set()
-
-
-def has_stdout() -> bool:
-    """Whether stdout leads anywhere: the shell may have closed it."""
-    return 1 not in _closed
+CLOSED: set[int] = set()
+"""Standard streams that the shell has closed."""
 
 
 def open_streams() -> None:
@@ -51,7 +47,7 @@ def open_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            _closed.add(number)
+            CLOSED.add(number)
             nowhere = os.open(os.devnull, os.O_RDWR)
             if nowhere != number:
                 os.dup2(nowhere, number)

@@ -32,19 +32,14 @@ def write_whole(path: Path, write: Callable[[Path], object], *, makes_folder: bo
 
 def write_together(files: Mapping[Path, Callable[[Path], object]]) -> None:
     """Write files as `write_whole` does, and rename none before all are complete; new folders go if one fails."""
-    with _new_folders() as make, ExitStack() as stack:
-        done = []
-        for path, write in files.items():
-            make(path.parent)
-            done.append((stack.enter_context(_finished(path, write)), path))
-        move_together(done)
+    with _folders(path.parent for path in files), ExitStack() as stack:
+        move_together([(stack.enter_context(_finished(path, write)), path) for path, write in files.items()])
 
 
 @contextmanager
 def folder_within(folder: Path) -> Iterator[Path]:
     """A folder for files that are to move into `folder` once all are there; new folders go if the block fails."""
-    with _new_folders() as make:
-        make(folder)
+    with _folders([folder]):
         temporary = Path(tempfile.mkdtemp(prefix=".", suffix=".tmp", dir=folder))
         with unfinished(temporary):
             try:
@@ -53,36 +48,29 @@ def folder_within(folder: Path) -> Iterator[Path]:
                 shutil.rmtree(temporary, ignore_errors=True)
 
 
-def move_together(files: Sequence[tuple[Path, Path]], gone: Iterable[Path] = ()) -> None:
+def move_together(files: Sequence[tuple[Path, Path]], gone: Sequence[Path] = (), *, again: bool = False) -> None:
     """Move files to their places in this order, and remove others. An interrupt waits: it would leave a mixture."""
-    interrupt: KeyboardInterrupt | None = None
-    is_done = False
-    while not is_done:
-        try:
-            for made, path in files:
-                path.parent.mkdir(exist_ok=True)
-                if interrupt is None or made.exists():
-                    made.replace(path)
-            for path in gone:
-                path.unlink(missing_ok=True)
-            is_done = True
-        except KeyboardInterrupt as error:
-            interrupt = error
-    if interrupt is not None:
-        raise interrupt
+    try:
+        for made, path in files:
+            path.parent.mkdir(exist_ok=True)
+            if not again or made.exists():
+                made.replace(path)
+        for path in gone:
+            path.unlink(missing_ok=True)
+    except KeyboardInterrupt:
+        move_together(files, gone, again=True)
+        raise
 
 
 @contextmanager
-def _new_folders() -> Iterator[Callable[[Path], None]]:
-    """Yield what makes a folder; those that are new go if the block fails."""
+def _folders(folders: Iterable[Path]) -> Iterator[None]:
+    """Make folders; those that are new go if the block fails."""
     made: list[Path] = []
-
-    def make(folder: Path) -> None:
-        made.extend(p for p in (folder, *folder.parents) if not p.exists())
-        folder.mkdir(parents=True, exist_ok=True)
-
     try:
-        yield make
+        for folder in folders:
+            made += [p for p in (folder, *folder.parents) if not p.exists()]
+            folder.mkdir(parents=True, exist_ok=True)
+        yield
     except BaseException:
         for folder in made:  # the innermost first; one that holds anything stays
             with suppress(OSError):

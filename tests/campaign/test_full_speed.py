@@ -122,7 +122,7 @@ def test_coverage_with_few_degrees_of_freedom():
 
 def test_what_cannot_be_told():
     assert "falls too little to extrapolate" in told(curve(230.0, 4.0)).reason
-    assert told(curve(400.0, 4.0, off=[0.02] * 6)).rests_on == "6 bins, 65 to 115 km/h, no contact lost"
+    assert told(curve(400.0, 4.0, off=[0.02] * 6)).rests_on == "6 bins, 65 to 115 km/h, contact down to 100 %"
     assert "2 bins" in told(curve(140.0, 4.0)[:2]).reason
     assert "beyond" in told(curve(200.0, 2.0, speeds=(60, 70, 80))).reason
     assert "no dry slope" in _from_slopes((), "rr", curve(140.0, 4.0), None, np.random.default_rng(1)).reason

@@ -71,7 +71,7 @@ def test_files_that_were_asked_for_are_written_together_or_none(table, tmp_path,
         if not path.name.startswith(".runs-"):
             raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("aqualog.face.result._bytes_file", lambda _: full)
+    monkeypatch.setattr("aqualog.face.result.methodcaller", lambda *_: full)
     for command, option in (("inspect", "--write-map"), ("doctor", "-o"), ("init", "-o")):
         done = run(command, table, option, "new/a", "--csv", "c.csv", cwd=tmp_path)
         assert done.exit_code == 1

@@ -7,7 +7,7 @@ import io
 import json
 import re
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
@@ -41,8 +41,11 @@ def page_names(names: Sequence[str]) -> list[str]:
 
 def targets_of(folder: Path, names: Sequence[str]) -> list[Path]:
     """All files that a report of runs with these names consists of."""
-    own = [*page_names(names), *(f"data/{t}" for t in _TABLES), "plotly.min.js", "index.html", MARK]
-    return [folder / name for name in own]
+    return [folder / name for name in _own(page_names(names))]
+
+
+def _own(pages: Sequence[str]) -> list[str]:
+    return [*pages, *(f"data/{t}" for t in _TABLES), "plotly.min.js", "index.html", MARK]
 
 
 def check_folder(folder: Path, *, force: bool) -> None:
@@ -75,46 +78,35 @@ def write_report(data: CampaignData, findings: Findings, folder: Path, *, report
     an earlier report that have no run any more are removed, and files that are not of a report stay.
     """
     pages = page_names([r.name for r in data.runs])
-    own = sorted({*pages, *(f"data/{t}" for t in _TABLES), "plotly.min.js"})
+    own = _own(pages)
+    facts: list[RunFacts | None] = []
+    # most of a small file's time is the wait until the disk has it
     with folder_within(folder) as made:
-        facts = _write_pages(data, made, pages, report)
+        with ThreadPoolExecutor(_WRITERS) as writers:
+            writing: deque[Future[None]] = deque()
+            for i, info in enumerate(data.runs):
+                samples = data.samples(info) if info.is_done else None
+                facts.append(facts_of(info, samples) if samples is not None else None)
+                full = data.full(info) if info.is_done else None
+                text = _clean(run_page(data, info, samples, facts[i], back="../index.html", full=full))
+                writing.append(writers.submit(write_text, made / pages[i], text))
+                while len(writing) > (_WAITING if i + 1 < len(pages) else 0):
+                    writing.popleft().result()
+                report(i + 1, len(pages))
         for name, text in tables_of(data, findings, facts, pages).items():
             write_text(made / "data" / name, _clean(text))
         write_text(made / "plotly.min.js", plotly_js())
         write_text(made / "index.html", _clean(campaign_page(data, findings, facts, pages)))
-        _mark(made / MARK, sorted([*own, "index.html"]))
-        own += ["index.html", MARK]
+        document = {"schema_version": 1, "files": sorted(own[:-1])}
+        write_text(made / MARK, json.dumps(document, indent=1) + "\n")
         gone = [folder / name for name in _earlier(folder) if name not in own]
         move_together([(made / name, folder / name) for name in own], gone)
     return len(own)
 
 
-def _write_pages(data: CampaignData, folder: Path, pages: Sequence[str], report: Report) -> list[RunFacts | None]:
-    """Write the pages of the runs; their facts."""
-    facts: list[RunFacts | None] = []
-    # most of a small file's time is the wait until the disk has it
-    with ThreadPoolExecutor(_WRITERS) as writers:
-        writing: deque[Future[None]] = deque()
-        for i, info in enumerate(data.runs):
-            samples = data.samples(info) if info.is_done else None
-            facts.append(facts_of(info, samples) if samples is not None else None)
-            full = data.full(info) if info.is_done else None
-            text = _clean(run_page(data, info, samples, facts[i], back="../index.html", full=full))
-            writing.append(writers.submit(write_text, folder / pages[i], text))
-            while len(writing) > (_WAITING if i + 1 < len(pages) else 0):
-                writing.popleft().result()
-            report(i + 1, len(pages))
-    return facts
-
-
 def _clean(text: str) -> str:
     """Text that UTF-8 can hold: a lone surrogate of a file name becomes a question mark."""
     return text.encode("utf-8", "replace").decode("utf-8")
-
-
-def _mark(path: Path, files: Sequence[str]) -> None:
-    document: Mapping[str, object] = {"schema_version": 1, "files": list(files)}
-    write_text(path, json.dumps(document, indent=1) + "\n")
 
 
 def _earlier(folder: Path) -> list[str]:

@@ -18,17 +18,8 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import Event, FloatArray
 from aqualog.report.campaign.full_rate import dense_of
 from aqualog.report.campaign.labels import key_title, value_text
-from aqualog.report.drive.judged import (
-    EPISODE_HEADS,
-    FOLDED,
-    card_lines,
-    detections_line,
-    episode_cells,
-    folded_line,
-    headline,
-    level,
-)
-from aqualog.report.drive.report import EVENT_HEADS, by_importance, event_cells
+from aqualog.report.drive.judged import EPISODE_HEADS, FOLDED, card_lines, episode_cells, folded_line, headline, level
+from aqualog.report.drive.report import EVENT_HEADS, by_importance, detections_line, event_cells
 from aqualog.report.page import report_page
 from aqualog.report.reduce import LONG_S, Budget, Plan, make_plan, spans_of
 from aqualog.report.sections import Cell, Code, Headline, Line, Lines, Para, Part, Report, Section, Stack, Table

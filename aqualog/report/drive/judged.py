@@ -13,8 +13,8 @@ from aqualog.report.values import KMH, counted, number
 from aqualog.report.wording import detector_name
 
 __all__ = [
-    "EPISODE_HEADS", "FOLDED", "KIND_NAMES", "card_lines", "detections_line", "episode_cells", "episode_sentence",
-    "folded_line", "headline", "judged_by", "level", "lines_of", "margin_lines", "missing_words",
+    "EPISODE_HEADS", "FOLDED", "KIND_NAMES", "card_lines", "episode_cells", "episode_sentence", "folded_line",
+    "headline", "judged_by", "level", "lines_of", "margin_lines", "missing_words",
 ]  # fmt: skip
 
 KIND_NAMES: dict[EpisodeKind, str] = {
@@ -94,12 +94,6 @@ def folded_line(kind: EpisodeKind, episodes: Sequence[Episode]) -> str:
     if len(episodes) == 1:
         return f"{name}: {episode_sentence(episodes[0])}"
     return f"{name}: {len(episodes)} episodes, {counted(sum(len(e.events) for e in episodes), 'detection')}"
-
-
-def detections_line(judgement: Judgement, count: int) -> str:
-    """How many detections follow one by one, and how many of them belong to no episode, such as the margin's."""
-    alone = count - sum(len(e.events) for e in judgement.episodes)
-    return f"{counted(count, 'detection')}, one by one{f', {alone} in no episode' if alone > 0 else ''}"
 
 
 def margin_lines(margin: Margin | None) -> list[str]:

@@ -18,7 +18,6 @@ from aqualog.report.drive.judged import (
     EPISODE_HEADS,
     FOLDED,
     card_lines,
-    detections_line,
     episode_cells,
     folded_line,
     headline,
@@ -34,7 +33,7 @@ from aqualog.report.page import report_page
 from aqualog.report.reduce import DRIVE, LONG_S, POINTS, Plan, make_plan
 from aqualog.report.sections import Cell, Figures, Headline, Line, Lines, Para, Part, Report, Section, Stack, Table
 from aqualog.report.theme import WHEEL_COLOURS
-from aqualog.report.values import number, place, pretty_unit
+from aqualog.report.values import counted, number, place, pretty_unit
 from aqualog.report.wording import detector_name, evidence_parts, not_judged, speed_kmh
 
 __all__ = ["EVENT_HEADS", "by_importance", "drive_page", "drive_report", "event_cells", "lacking"]
@@ -232,6 +231,12 @@ def _problems(result: DriveResult) -> list[str]:
 
 
 # --- tables ----------------------------------------------------------------------------------------------------------
+
+
+def detections_line(judgement: Judgement, count: int) -> str:
+    """How many detections follow one by one, and how many of them belong to no episode, such as the margin's."""
+    alone = count - sum(len(e.events) for e in judgement.episodes)
+    return f"{counted(count, 'detection')}, one by one{f', {alone} in no episode' if alone > 0 else ''}"
 
 
 def event_cells(event: Event, unit: str = "") -> list[Cell]:

@@ -16,8 +16,8 @@ import pytest
 import aqualog.report
 from aqualog.core.judgement import Episode, Judgement
 from aqualog.core.records import Margin, Quality, Unavailable
-from aqualog.report.drive.judged import detections_line, judged_by
-from aqualog.report.drive.report import FIRST_EVENTS, MOST_ROWS, drive_page, drive_report, event_cells
+from aqualog.report.drive.judged import judged_by
+from aqualog.report.drive.report import FIRST_EVENTS, MOST_ROWS, detections_line, drive_page, drive_report, event_cells
 from aqualog.report.page import write_page
 from aqualog.report.reduce import POINTS
 from aqualog.report.text import report_text
