@@ -175,7 +175,7 @@ def align(
         first = names_of(reference)
         drive = read([*first, *names_of(sources)], map, vehicle, dbc=dbc)
     if len(drive.paths) < 2:
-        raise ConfigError("align compares files", expected="a reference and another file, each named once")
+        raise ConfigError("align compares different files", expected="a reference and at least one other file")
     files = [p.name for p in drive.paths]
     for file, channel in (channels or {}).items():
         if file not in files or not channel:

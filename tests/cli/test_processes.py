@@ -20,7 +20,7 @@ CALLS = {
     "init": (("lane_drive.mf4", "-o", "work"), 0, "aqualog detect lane_drive.mf4"),
     "doctor": (("cut.mcap", *CAR), 3, "cut.mcap"),
     "convert": (("lane_drive.mf4", *CAR, "-o", "again.parquet"), 0, ""),
-    "align": (("lane_drive.mf4",), 2, "at least one source"),
+    "align": (("lane_drive.mf4",), 2, "at least one other file"),
     "slip-slope": (("short.csv", *CAR), 4, "error: "),
     "batch": (("campaign.toml", "--jobs", 1, "--json"), 0, '"made": 1'),
     "plan": (("campaign.toml", "--jobs", 1), 0, "1 log"),

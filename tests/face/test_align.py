@@ -86,7 +86,7 @@ def test_wrong_arguments(folder, arguments, said):
 
 
 def test_one_file_is_too_few(folder):
-    with pytest.raises(aq.AqualogError, match="a reference and another file, each named once"):
+    with pytest.raises(aq.AqualogError, match="different files; expected a reference and at least one other file"):
         aq.align(folder / "wheels.csv")
 
 
