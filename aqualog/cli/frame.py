@@ -137,10 +137,11 @@ class Run:
             return None
         from aqualog.face.cache import NoCacheFolderError, cache_of_user
 
+        say = self.console.note if self.cache else self.console.detail
         try:
-            return cache_of_user(tell=self.console.note if self.cache else self.console.detail)
+            return cache_of_user(tell=say)
         except NoCacheFolderError:
-            self.console.detail("there is no home folder to keep signals in; AQUALOG_CACHE names another")
+            say("there is no home folder to keep signals in; AQUALOG_CACHE names another")
             return None
 
     def campaign(self, inputs: Sequence[str] = ()) -> Campaign:
