@@ -24,8 +24,9 @@ __all__ = ["Begun", "Fitted", "Members", "Posterior", "begin", "compete", "rule"
 
 ROUGHLY = 2  # sets that are carried on while the noise is sought
 ROUNDS = 4  # of noise, each after what the one before has found
+SETTLED = 2.0  # [nats] that a better noise gains, below which the next one is not sought
 PAIRS, SEED = 2, 20  # of draws of a set's values
-NEGLIGIBLE = 0.3  # variance, in units of white noise's, of a direction of the tolerances that is left out
+NEGLIGIBLE = 1.0  # variance, in units of white noise's, of a direction of the tolerances that is left out
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,8 +120,11 @@ def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -
         if better.likely <= noise.likely:
             break
         again = second if better is likeliest else begun.after(better.members, better.fit, number)
-        noise = again if again.is_consistent and again.likely > better.likely else better
+        new = again if again.is_consistent and again.likely > better.likely else better
+        gained, noise = new.likely - noise.likely, new
         gram = arena.inner(noise.weighings)
+        if gained < SETTLED:
+            break
     forms = any(b.kind == "shape" for b in arena.blocks)
     tolerant = arena.tolerant((COARSE_FORMS if forms else COARSE) * gram)
     sets = searched(arena.blocks, tolerant, rule(arena.evidence, arena.blocks, gram))
