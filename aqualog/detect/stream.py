@@ -122,10 +122,11 @@ class Through:
     """The one way through a drive: piece by piece through all detectors, with what is checked and gathered beside."""
 
     def __init__(
-        self, vehicle: Vehicle, dt_ns: int, present: Sequence[str], settings: Settings | None, memory: Memory | None
-    ) -> None:
+        self, vehicle: Vehicle, dt_ns: int, present: Sequence[str], settings: Settings | None, memory: Memory | None,
+        *, is_checked: bool = True,
+    ) -> None:  # fmt: skip
         self._stream = DriveStream(vehicle, dt_ns, present, settings=settings, memory=memory)
-        self._checks = Checks(present, vehicle, self._stream.dt)
+        self._checks = Checks(present, vehicle, self._stream.dt) if is_checked else None
         self._vehicle = vehicle
         self._events: list[Event] = []
         self._way = Way(self._stream.dt)
@@ -135,7 +136,8 @@ class Through:
     def push(self, columns: Mapping[str, FloatArray]) -> Piece:
         """Take the next samples; as `DriveStream.push`."""
         piece = self._stream.push(columns)
-        self._checks.push(columns, piece.features)
+        if self._checks is not None:
+            self._checks.push(columns, piece.features)
         self._events += piece.events
         self._way.push(piece.features["v_x_hat"])
         self._least.push(piece.features, next((t for t in piece.tracks if t.detector == MARGIN.name), None))
@@ -149,7 +151,7 @@ class Through:
 
         stream = self._stream
         slopes = stream.slopes
-        checks = self._checks.remarks(signals.origins)
+        checks = self._checks.remarks(signals.origins) if self._checks is not None else ()
         events = in_order((*self._events, *stream.finish()))
         judgement = judge(
             events, stream.unavailable, [d.name for d in stream.watches], judged_s=self._judged * stream.dt,
@@ -178,6 +180,7 @@ def detect_drive(
     settings: Settings | None = None,
     memory: Memory | None = None,
     samples: bool = True,
+    is_checked: bool = True,
 ) -> DriveResult:
     """Run all detectors over one drive.
 
@@ -187,6 +190,8 @@ def detect_drive(
         Prior knowledge of the dry slip slope; `slip_slope.history.remembered` adds what this drive has shown.
     samples : bool
         Whether to keep features and tracks with all their samples; without them the result has them empty.
+    is_checked : bool
+        Whether to look if the inputs fit each other: a simulation needs no such look.
 
     Returns
     -------
@@ -196,7 +201,7 @@ def detect_drive(
     # a column without a single value is a signal that the drive does not have
     rows = signals.frame.height
     present = [s for s in signals.symbols if signals.frame[s].null_count() < rows]
-    through = Through(vehicle, signals.dt_ns, present, settings, memory)
+    through = Through(vehicle, signals.dt_ns, present, settings, memory, is_checked=is_checked)
     columns = {s: signals.array(s) for s in (present or ["v_x"])}
     kept = rows if samples else 0
     features: dict[str, FloatArray] = {}

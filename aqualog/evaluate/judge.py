@@ -39,7 +39,10 @@ class Found:
     checks: tuple[Remark, ...] = ()
 
 
-def judge(drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None) -> RunRecord:
+def judge(
+    drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None,
+    is_checked: bool = True,
+) -> RunRecord:  # fmt: skip
     """Run the detectors over a drive and score them.
 
     Parameters
@@ -48,20 +51,24 @@ def judge(drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str
         Detectors see its signals without the truth.
     rivals : mapping name -> float, optional
         Thresholds of rivals (those not named: default); None: without rivals.
+    is_checked : bool
+        Whether to look if the inputs fit each other.
     """
-    return record_of(drive, run_detectors(drive, thresholds=thresholds, rivals=rivals))
+    return record_of(drive, run_detectors(drive, thresholds=thresholds, rivals=rivals, is_checked=is_checked))
 
 
 def run_detectors(
-    drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None, own: bool = True
-) -> Found:
+    drive: Drive, *, thresholds: Thresholds = DEFAULT, rivals: Mapping[str, float] | None = None, own: bool = True,
+    is_checked: bool = True,
+) -> Found:  # fmt: skip
     """Return events of the thesis' detectors and of rivals in the log (both: `own`), and of `rivals`; see `judge`."""
     v_x = drive.signals.array("v_x")
     results: list[DriveResult | RivalResult] = []
     ran: list[str] = []
     checks: tuple[Remark, ...] = ()
     if own:
-        result = detect_drive(drive.signals, drive.vehicle, settings=Settings(thresholds, joint_cusum=drive.joint))
+        settings = Settings(thresholds, joint_cusum=drive.joint)
+        result = detect_drive(drive.signals, drive.vehicle, settings=settings, is_checked=is_checked)
         results.append(result)
         checks = result.checks
         ran += [d for d in DETECTORS if d not in {u.detector for u in result.unavailable}]

@@ -74,6 +74,11 @@ def test_a_drive_that_is_its_own_reference_says_so():
 
 def test_sign_of_the_accelerometer():
     assert any("a_x has the opposite sign" in n for n in notes(a_x=lambda f: -f["a_x"]))
+    signals, _ = drive(CAR, **SPEEDS)
+    turned = replace(signals, frame=signals.frame.with_columns(-pl.col("a_x")))
+    looks = [detect_drive(turned, CAR, is_checked=x) for x in (True, False)]
+    assert [bool(d.checks) for d in looks] == [True, False]
+    assert [e.start_s for e in looks[0].events] == [e.start_s for e in looks[1].events]
 
 
 def test_sign_of_the_yaw_rate():

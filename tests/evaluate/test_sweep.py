@@ -238,7 +238,7 @@ def test_each_detector_is_swept_by_its_own_threshold(sources, monkeypatch):
     monkeypatch.setattr(
         judge_module,
         "detect_drive",
-        lambda s, v, settings: asked.append(settings.thresholds) or detect(s, v, settings=settings),
+        lambda s, v, settings, **how: asked.append(settings.thresholds) or detect(s, v, settings=settings, **how),
     )
     records_at(sources[0].load(), 2.0)
     single, joint = asked
