@@ -47,12 +47,13 @@ def missing_words(missing: Sequence[str]) -> str:
     return ", ".join(f"no {w}" for w in dict.fromkeys(words))
 
 
-def level(judgement: Judgement) -> str:
-    """The look of the verdict: `full`, `partial`, `none`, or `open` where it cannot be judged."""
+def level(judgement: Judgement, margin: Margin | None = None) -> str:
+    """The look of the verdict: `full`, `partial` (or a warning), `none`, or `open` where it cannot be judged."""
     if judgement.verdict == "cannot_be_judged":
         return "open"
     wet = judgement.of("aquaplaning")
-    return ("full" if any(e.severity == "full" for e in wet) else "partial") if wet else "none"
+    is_warned = margin is not None and math.isfinite(margin.warned_s)
+    return "full" if any(e.severity == "full" for e in wet) else "partial" if wet or is_warned else "none"
 
 
 def headline(judgement: Judgement, *, doubted: bool = False, margin: Margin | None = None) -> str:

@@ -102,7 +102,7 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
             Para(f"{' '.join(judged_by(judgement, signals.duration_s))}\n{result.vehicle_name}: "
                  f"{signals.duration_s:.1f} s at {1e9 / signals.step_ns:g} Hz, {len(signals.symbols)} signals",
                  where="text"),
-        ], "verdict", look=f"verdict events {level(judgement)}"),
+        ], "verdict", look=f"verdict events {level(judgement, result.margin)}"),
         *input_sections(result.checks),
         Section("Problems of the data", [Lines(_problems(result), most=1000)], "problems", look="problems",
                 where="page"),

@@ -165,6 +165,7 @@ def test_a_warning_without_an_episode_is_in_the_verdict(short):
     warned = drive_report(replace(fake.with_events(short, ()), margin=margin))
     first = "No aquaplaning, but a warning at 40.8 s: 15 km/h (3 ... 42) to full aquaplaning"
     assert report_text(warned).splitlines()[0] == first
+    assert card(replace(fake.with_events(short, ()), margin=margin))[0] == "partial"
     calm = drive_report(replace(fake.with_events(short, ()), margin=replace(margin, warned_s=math.nan)))
     assert report_text(calm).splitlines()[0] == "No aquaplaning"
     assert "warning" not in report_text(drive_report(replace(short, margin=margin))).splitlines()[0]
