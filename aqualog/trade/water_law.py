@@ -189,14 +189,19 @@ def fit_water(passes: Sequence[WetPass], vehicle: Vehicle, tyre: Tyre, *, p: flo
             f"{len(used)} of {len(passes)} passes over water can be used" + (f" ({why})" if why else ""),
             expected=f"at least {LEAST_PASSES}, at several speeds up to a wheel that stops",
         )
-    grid, edges = (_SCALES, _EXPONENTS), (False, False)
-    for number in range(_ROUNDS):
-        each = np.stack([_likelihood(w.windows, vehicle, tyre, p, grid) for w in used])
-        total = each.sum(axis=0)
-        whole, sd, scatter = _posterior(total, grid)
-        edges = edges if number else _at_edges(total)
-        left = np.array([_posterior(total - one, grid).mean for one in each])
-        grid = _finer(grid, whole, sd, scatter)
+
+    def over(grid: _Grid) -> FloatArray:
+        return np.stack([_likelihood(w.windows, vehicle, tyre, p, grid) for w in used])
+
+    grid: _Grid = (_SCALES, _EXPONENTS)
+    each = over(grid)
+    edges = _at_edges(each.sum(axis=0))
+    for _ in range(_ROUNDS - 1):
+        grid = _finer(grid, _posterior(each.sum(axis=0), grid))
+        each = over(grid)
+    total = each.sum(axis=0)
+    whole, sd, scatter = _posterior(total, grid)
+    left = np.array([_posterior(total - one, grid).mean for one in each])
     n = len(used)
     jack = np.sqrt((n - 1.0) / n * ((left - left.mean(axis=0)) ** 2).sum(axis=0))
     half = np.hypot(student_quantile(0.975, n - 1.0) * np.maximum(sd, jack), 1.96 * np.array(_EVEN_SD))
@@ -256,11 +261,14 @@ def _posterior(log_likelihood: FloatArray, grid: _Grid) -> _Posterior:
     return _Posterior(mean, np.sqrt(square), float(weight.sum(axis=(1, 2)) @ _SCATTERS))
 
 
-def _finer(grid: _Grid, mean: FloatArray, sd: FloatArray, scatter: float) -> _Grid:
+def _finer(grid: _Grid, found: _Posterior) -> _Grid:
     """The same number of values about the estimate: steps of 12 % of the exponent move the scale by 3 %."""
-    beside = (2.5 * scatter, 0.0)  # speeds that scatter into the range
-    ends = [(x[0], x[-1], _REACH * max(s, x[1] - x[0]) + b) for x, s, b in zip(grid, sd, beside, strict=True)]
-    fine = [np.linspace(max(m - r, a), min(m + r, b), x.size) for x, m, (a, b, r) in zip(grid, mean, ends, strict=True)]
+    beside = (2.5 * found.scatter, 0.0)  # speeds that scatter into the range
+    ends = [(x[0], x[-1], _REACH * max(s, x[1] - x[0]) + b) for x, s, b in zip(grid, found.sd, beside, strict=True)]
+    fine = [
+        np.linspace(max(m - r, a), min(m + r, b), x.size)
+        for x, m, (a, b, r) in zip(grid, found.mean, ends, strict=True)
+    ]
     return fine[0], fine[1]
 
 

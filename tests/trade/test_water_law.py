@@ -1,5 +1,6 @@
 """The law of water from a user's own passes: estimates near the truth, clear errors, and a file that simulates again."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,8 +13,9 @@ from aqualog.core.vehicle import Vehicle, WaterNumber, vehicle_toml
 from aqualog.model.even_wheel import even_slip
 from aqualog.model.published import Condition, full_speed
 from aqualog.model.tyre import TYRES, Tyre
-from aqualog.trade.water_law import calibrate_wet, check_known
-from aqualog.trade.wet_passes import Told, passes_of
+from aqualog.trade import water_law
+from aqualog.trade.water_law import calibrate_wet, check_known, fit_water
+from aqualog.trade.wet_passes import Told, WetPass, Window, passes_of
 from tests.both_ways import command
 from tests.trade.water_study import drawn, fitted, logs
 
@@ -155,3 +157,17 @@ def test_a_named_tyre_takes_the_numbers_of_the_car(tmp_path):
     (tmp_path / "s.toml").write_text('vehicle = "car.toml"\nspeed_kmh = 90\ntyre = "new_summer"\n', encoding="utf-8")
     made = load_scenario(tmp_path / "s.toml")
     assert made.tyre_front == replace(TYRES["new_summer"], v_anchor=31.0)
+
+
+def test_numbers_between_the_values_of_the_grid(monkeypatch):
+    """Passes that show more than the first grid's steps of 2 and 12 %."""
+    passes = [WetPass(f"{k}", (Window(25.0 + k, 1e-3, 4e3, math.nan, 0.0, False),)) for k in range(5)]
+
+    def likelihood(windows, vehicle, tyre, p, grid):
+        scale, exponent = (((x - m) / s) ** 2 for x, m, s in zip(grid, (0.0337, 1.271), (0.004, 0.02), strict=True))
+        return np.broadcast_to(-0.5 * (scale[:, None] + exponent), (4, scale.size, exponent.size))
+
+    monkeypatch.setattr(water_law, "_likelihood", likelihood)
+    v_anchor, exponent = fit_water(passes, Vehicle(), Tyre(), p=2e5).parameters
+    assert v_anchor.value == pytest.approx(Tyre().v_anchor * math.exp(0.0337), rel=2e-4)
+    assert exponent.value == pytest.approx(math.exp(1.271), rel=1e-3)
