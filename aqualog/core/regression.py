@@ -80,7 +80,9 @@ def _about_own_mean(d: Design, m: Moments, w: _Working) -> Moments:
 def _working_model(d: Design, first: Index, m: Moments, weight: FloatArray | None = None) -> _Working:
     """Variances within and between the runs."""
     own = np.einsum("gij,gj->gi", np.linalg.pinv(m.h, rcond=1e-8, hermitian=True), m.c)
-    e = residuals(d.columns, d.y, first, own) * (1.0 if weight is None else np.sqrt(weight))
+    e = residuals(d.columns, d.y, first, own)
+    if weight is not None:
+        e *= np.sqrt(weight)
     memory = _memory(e, d.run, d.step)
     free = np.maximum(m.weight - len(d.columns) * memory, 0.2 * m.weight)
     variance = max(float(e @ e) / float(free.sum()), 1e-30) * memory
@@ -254,7 +256,7 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
     and Satterthwaite's degrees of freedom [satterthwaite1946], as Pustejovsky and Tipton [pustejovsky2018] give them
     for weighted fits: they hold with a handful of runs, and whether or not the model behind the weights is right.
     """
-    unit = np.sqrt(np.mean(design.columns**2, axis=1))
+    unit = np.sqrt(np.einsum("pn,pn->p", design.columns, design.columns) / design.y.size)
     unit[unit == 0.0] = 1.0  # columns differ by orders of magnitude
     d = design._replace(columns=design.columns / unit[:, None])
     first = starts_of(d.run)
@@ -306,13 +308,14 @@ def _half_widths(m: Moments, k: FloatArray, value: FloatArray) -> tuple[FloatArr
     root, unroot = (axes * size**-0.5) @ axes.T, (axes * size**0.5) @ axes.T  # M^(1/2), M^(-1/2)
     share, turn = np.linalg.eigh(root @ plain @ root)  # share of a run in the whole: B
     share = np.clip(share, 0.0, 1.0 - 1e-6)
-    grow = np.einsum("gij,gj,gkj->gik", turn, (1.0 - share) ** -0.5, turn)
+    back = np.swapaxes(turn, 1, 2)
+    grow = (turn * ((1.0 - share) ** -0.5)[:, None]) @ back
     score = np.einsum("gij,gj->gi", k, m.c - m.c_noise - (m.h - m.h_noise) @ value)
     score = np.einsum("gij,gj->gi", grow, score @ root)
     jacobian = np.linalg.pinv(np.einsum("gij,gjk->ik", k, m.h - m.h_noise), rcond=1e-10)
     to_value = jacobian @ unroot
     half, dof = np.zeros(p), np.zeros(p)
-    b = np.einsum("gij,gj,gkj->gik", turn, share, turn)
+    b = (turn * share[:, None]) @ back
     for i in range(p):
         w = to_value[i]
         sigma = math.sqrt(float(np.sum((score @ w) ** 2)))
