@@ -177,26 +177,28 @@ def _autoregression(z: FloatArray, weights: FloatArray, white: float) -> FloatAr
     return taps
 
 
-def whitened(x: FloatArray, noise: Noise) -> FloatArray:
-    """Arrays (k, C, n), bridged, as independent unit innovations, flat: (k, C n).
+def whitened(x: FloatArray, noise: Noise, used: BoolArray | None = None) -> FloatArray:
+    """Arrays (k, C, n), bridged, as independent unit innovations, flat: (k, C n), or of the m `used` samples: (k, C m).
 
     Their first second replaces the unknown past. Inner products of whitened arrays are in units of twice the
     log-likelihood; masked samples are zero.
     """
-    out = np.empty(x.shape)
+    kept = np.arange(x.shape[-1]) if used is None else np.flatnonzero(used)
+    out = np.empty((*x.shape[:-1], kept.size))
     shares = np.diff(np.pad(-noise.taps[:, [a for a, _ in _BLOCKS]], [(0, 0), (1, 1)]))
     weights = np.broadcast_to(noise.weights, x.shape[1:])
-    _whiten(np.ascontiguousarray(x), noise.rotation, shares, weights, noise.shaping, out)
+    _whiten(np.ascontiguousarray(x), noise.rotation, shares, weights, noise.shaping, kept, out)
     return out.reshape(len(x), -1)
 
 
 @compiled
-def _whiten(x, rotation, shares, weights, shaping, out):  # type: ignore[no-untyped-def]
+def _whiten(x, rotation, shares, weights, shaping, kept, out):  # type: ignore[no-untyped-def]
     """Fill the innovations of arrays: what each combination is beyond its last samples and means over blocks of them.
 
     Means over blocks are differences of running totals: `shares` (C, 12) are those of the totals up to each edge.
     """
     _, C, n = x.shape
+    m = kept.size
     e = np.empty((C, n))
     z = np.empty(n + MEMORY)
     total = np.zeros(n + MEMORY + 1)
@@ -219,10 +221,12 @@ def _whiten(x, rotation, shares, weights, shaping, out):  # type: ignore[no-unty
                 for t in range(n):
                     own[t] -= p * P[t] + q * Q[t] + r * R[t] + s * S[t]
             own *= weights[c]
+            for t in range(m if m < n else 0):
+                own[t] = own[kept[t]]  # they ascend
         for c in range(C):
             to = out[i, c]
             to[:] = 0.0
             for j in range(c + 1):  # the inverse of a Cholesky factor
                 share = shaping[c, j]
-                for t in range(n):
+                for t in range(m):
                     to[t] += share * e[j, t]

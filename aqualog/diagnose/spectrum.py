@@ -61,9 +61,8 @@ class Weighing:
 
         def fill(i: int) -> None:
             own = x[i : i + CHUNK]
-            flat = whitened(bridged(own, self.mask), self.noise).reshape(own.shape)
-            lines = np.fft.rfft(flat if self.used.all() else flat[..., self.used], self.size)
-            lines = lines[..., : self.inverse.shape[3]]
+            flat = whitened(bridged(own, self.mask), self.noise, self.used).reshape(*own.shape[:2], -1)
+            lines = np.fft.rfft(flat, self.size)[..., : self.inverse.shape[3]]
             _unrelated(lines, self.inverse, out[i : i + CHUNK].reshape(len(own), 2, *lines.shape[1:]))
 
         beside(fill, range(0, len(x), CHUNK))
@@ -101,8 +100,8 @@ def weighing(residuals: Sequence[FloatArray] | FloatArray, mask: BoolArray, cont
     used = np.asarray((noise.weights > 0.0).any(axis=0))
     count = int(used.sum())
     size = good_size(count)
-    e = whitened(bridged(np.array(residuals), mask), noise).reshape(-1, *residuals[0].shape)
-    raw = np.fft.rfft(e[..., used], size).transpose(0, 2, 1) / np.sqrt(count)  # (draws, F, C)
+    e = whitened(bridged(np.array(residuals), mask), noise, used).reshape(len(residuals), -1, count)
+    raw = np.fft.rfft(e, size).transpose(0, 2, 1) / np.sqrt(count)  # (draws, F, C)
     pilot = _power_law((np.abs(raw[:, 1:]) ** 2).mean(axis=0))
     pilot = np.concatenate([pilot[:1], pilot])
     flat = raw[:, 1:] / pilot[1:]
