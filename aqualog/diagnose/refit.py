@@ -135,9 +135,9 @@ def likeliest(evidence: Evidence, measure: Metric, residuals: Sequence[FloatArra
     """The model with what the car and its tyres differ by from their file, most likely beside these residuals (C, n).
 
     All tolerances deviate together, theta = (S^-2 + A'A)^-1 A'y, each up to `FARTHEST`. Those of a drive or a lane are
-    left out of the model: another drive has other ones. So is the build-up of tyre forces, with which a simulated wheel
-    may swing at low speed. Less friction stands for a curve that bends early, but would let the wheels spin, and is
-    left out, too. A term that the model has keeps its values. `measure`: with all tolerances in full.
+    left out of the model: another drive has other ones. Less friction stands for a curve that bends early, but would
+    let the wheels spin, and is left out, too. A term that the model has keeps its values. `measure`: with all
+    tolerances in full.
     """
     k = np.flatnonzero(evidence.forgiven > 0.0)
     theta = np.zeros(evidence.count)
@@ -147,7 +147,7 @@ def likeliest(evidence: Evidence, measure: Metric, residuals: Sequence[FloatArra
     theta[k] = evidence.forgiven[k] * np.clip(likely, least, FARTHEST)
     own, has = [], {(t.effect.name, t.place) for t in model.terms}
     for h, columns in zip(evidence.asked, evidence.columns, strict=True):
-        stays = h.lane is None and h.effect.belongs in ("car", "tyre") and not h.effect.drive.is_quick
+        stays = h.lane is None and h.effect.belongs in ("car", "tyre")
         if stays and theta[list(columns)].any() and (h.effect.name, h.where or h.effect.default) not in has:
             at = [(n, h.parameter(n), value_in(model, h, n) + theta[c]) for n, c in zip(h.free, columns, strict=True)]
             own.append((h, {n: min(max(float(x), p.low), p.high) for n, p, x in at}))

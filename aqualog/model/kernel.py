@@ -20,13 +20,18 @@ from aqualog.model.state import (
     A_X,
     A_Y,
     AT,
+    J_SV,
+    J_SW,
     J_V,
+    J_VS,
     J_W,
+    J_WS,
     MOTION_WIDTH,
     N_JACOBIAN,
     N_STATES,
     OMEGA,
     PSI,
+    SLIP_X,
     STEER,
     V_X,
     V_Y,
@@ -115,7 +120,7 @@ _PER_FORCE = 1.0 / (steering.STEERING.stiffness * steering.STEERING.arm)  # [rad
 # which the rack stands and how far the rods' force bends the column [rad]
 _MEMORY = np.dtype([
     *((name, np.float64, N_STATES) for name in ("y", "f", "k1", "k2", "rest")),
-    ("jac", np.float64, N_JACOBIAN),
+    ("jac", np.float64, N_JACOBIAN), ("turned", np.float64, 8),
     ("out", np.float64, WIDTH), *((name, np.float64, 4) for name in ("released", "releasing", "applied")),
     *((name, np.float64) for name in ("is_first", "is_recorded", "is_detailed", "rack", "bent")),
 ])  # fmt: skip
@@ -256,19 +261,36 @@ def _turned_back(m, p, wheels, v_target, steer):  # type: ignore[no-untyped-def]
 
 
 @_called
-def _solve(f, jac, h, k):  # type: ignore[no-untyped-def]
-    """Solve (1 - h J) k = f: J is diagonal but for v_x and the wheels with their belts, which are coupled."""
+def _solve(f, jac, h, k, turned):  # type: ignore[no-untyped-def]
+    """Solve (1 - h J) k = f: J is diagonal but for v_x, the wheels with their belts, and slips that build up.
+
+    The slip that a wheel's force waits for swings with it. It is eliminated first: `k` holds its part until then.
+    """
     for i in range(N_STATES):
         k[i] = f[i] / (1.0 - h * jac[i])
     right = f[V_X]
     left = 1.0 - h * jac[V_X]
     for i in range(8):
-        own = 1.0 - h * jac[OMEGA + i]
-        right += h * jac[J_V + i] * f[OMEGA + i] / own
-        left -= h * h * jac[J_V + i] * jac[J_W + i] / own
+        own, to_v, of_v = 1.0 - h * jac[OMEGA + i], h * jac[J_V + i], h * jac[J_W + i]
+        if jac[J_WS + i] != 0.0:
+            s = i % 4
+            slip = 1.0 - h * jac[SLIP_X + s]
+            own -= h * h * jac[J_WS + i] * jac[J_SW + s] / slip
+            of_v += h * h * jac[J_WS + i] * jac[J_SV + s] / slip
+            to_v += h * h * jac[J_VS + s] * jac[J_SW + s] / slip
+            right += h * jac[J_VS + s] * k[SLIP_X + s]
+            left -= h * h * jac[J_VS + s] * jac[J_SV + s] / slip
+            k[OMEGA + i] = (f[OMEGA + i] + h * jac[J_WS + i] * k[SLIP_X + s]) / own
+        right += to_v * k[OMEGA + i]
+        left -= to_v * of_v / own
+        turned[i] = of_v / own
     k[V_X] = right / left
     for i in range(8):
-        k[OMEGA + i] = (f[OMEGA + i] + h * jac[J_W + i] * k[V_X]) / (1.0 - h * jac[OMEGA + i])
+        k[OMEGA + i] += turned[i] * k[V_X]
+        if jac[J_WS + i] != 0.0:
+            s = i % 4
+            more = jac[J_SW + s] * k[OMEGA + i] + jac[J_SV + s] * k[V_X]
+            k[SLIP_X + s] += h * more / (1.0 - h * jac[SLIP_X + s])
 
 
 @part
@@ -347,7 +369,7 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
             antilock(m, dt)
         if p.steering_friction > 0.0:
             _settle_rack(m, wheels, p.steering_friction)
-        _solve(m.f, m.jac, h, m.k1)
+        _solve(m.f, m.jac, h, m.k1, m.turned)
         for i in range(N_STATES):
             m.y[i] = y[i] + dt * m.k1[i]
         _fill(m.applied, applied, k + 1)
@@ -355,7 +377,7 @@ def integrate(every, memory, car, wheels, knots, lanes, fields, controls, applie
         _rhs(t + dt, m, controls[k + 1], p, wheels, knots, lanes, fields, track)
         for i in range(N_STATES):
             m.rest[i] = m.f[i] - 2.0 * m.k1[i]
-        _solve(m.rest, m.jac, h, m.k2)
+        _solve(m.rest, m.jac, h, m.k2, m.turned)
         total = 0.0
         for i in range(N_STATES):
             y[i] += dt * (1.5 * m.k1[i] + 0.5 * m.k2[i])

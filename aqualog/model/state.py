@@ -25,9 +25,10 @@ V_X, V_Y, YAW_RATE, PSI, S, Y_LAT, A_X, A_Y, INTEGRAL, DRIVE, BRAKE, STEER = ran
 OMEGA, BELT, ANGLE, SLIP_X, SLIP_Y, TWIST, LIFT, RISE = range(12, 44, 4)
 N_STATES = 44
 # the Jacobian: a diagonal, and behind it the coupling of v_x with the wheels and then the belts, d(v_x')/d(omega) and
-# d(omega')/d(v_x)
-J_V, J_W = N_STATES, N_STATES + 8
-N_JACOBIAN = N_STATES + 16
+# d(omega')/d(v_x); where slip builds up, that of a wheel's slip with both: d(omega')/d(s), d(v_x')/d(s) and back
+J_V, J_W, J_WS = N_STATES, N_STATES + 8, N_STATES + 16
+J_VS, J_SW, J_SV = J_WS + 8, J_WS + 12, J_WS + 16
+N_JACOBIAN = J_SV + 4
 
 # what is recorded: of the car, and four of each wheel; motion first, which a drive that is followed needs alone
 _MOTION = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "position", "nudge", "slides")

@@ -31,7 +31,26 @@ from aqualog.model.road import (
     at_position,
     rise_at,
 )
-from aqualog.model.state import ANGLE, AT, BELT, J_V, J_W, LIFT, OMEGA, RISE, SLIP_X, SLIP_Y, TWIST, V_X, V_Y, YAW_RATE
+from aqualog.model.state import (
+    ANGLE,
+    AT,
+    BELT,
+    J_SV,
+    J_SW,
+    J_V,
+    J_VS,
+    J_W,
+    J_WS,
+    LIFT,
+    OMEGA,
+    RISE,
+    SLIP_X,
+    SLIP_Y,
+    TWIST,
+    V_X,
+    V_Y,
+    YAW_RATE,
+)
 from aqualog.physics import contact, hydroplaning, kinematics, load, rolling, slip, steering, surface, tyre_brush, water
 from aqualog.physics.hydroplaning import WaterLaw
 from aqualog.physics.resistance import rolling_resistance_force
@@ -339,6 +358,7 @@ def _slip(i, m, roll, sigma, dt):  # type: ignore[no-untyped-def]
     s_x = _bounded_slip(roll.rim, roll.along)
     speed = max(abs(roll.rim), 0.5)
     s_y = -roll.across / speed
+    by_omega = max(roll.along, 0.0) * roll.r_e / (speed * speed) if abs(roll.rim) > 0.5 else 2.0 * roll.r_e
     if sigma > 0.0:
         rate = min(speed / sigma, 1.0 / dt)
         m.f[SLIP_X + i] = rate * (s_x - m.y[SLIP_X + i])
@@ -346,9 +366,9 @@ def _slip(i, m, roll, sigma, dt):  # type: ignore[no-untyped-def]
         if m.is_first > 0.0:
             m.jac[SLIP_X + i] = -rate
             m.jac[SLIP_Y + i] = -rate
+            m.jac[J_SW + i], m.jac[J_SV + i] = rate * by_omega, -rate / speed
         if sigma > speed * dt:
             return _Slip(m.y[SLIP_X + i], m.y[SLIP_Y + i], 0.0, 0.0)
-    by_omega = max(roll.along, 0.0) * roll.r_e / (speed * speed) if abs(roll.rim) > 0.5 else 2.0 * roll.r_e
     return _Slip(s_x, s_y, by_omega, -1.0 / speed)
 
 
@@ -397,6 +417,9 @@ def _jacobian(i, m, F_x, roll, slips, stiff, L, balance, p, q):  # type: ignore[
     jac[J_W + tread] = -dF_dsx * slips.by_v * arm
     jac[J_V + tread] = dF_dsx * slips.by_omega / p.mass
     jac[V_X] += dF_dsx * slips.by_v / p.mass
+    if q.relaxation_length > 0.0:
+        lags = 1.0 if slips.by_v == 0.0 else 0.0
+        jac[J_WS + tread], jac[J_VS + i] = -lags * dF_dsx * arm, lags * dF_dsx / p.mass
     across = stiff.C_y * slips.by_v * (dF_dsx / max(stiff.C_x, 1.0))
     jac[V_Y] += across / p.mass
     jac[YAW_RATE] += across * roll.x * roll.x / p.I_zz
