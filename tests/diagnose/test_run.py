@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -43,8 +44,17 @@ def noisy(*terms, drop=(), **kw):
     return signals(*terms, sensors=NOISY, drop=("tie_rod_fl", "tie_rod_fr", *drop), **kw)
 
 
-def told(*terms, model=None, options=QUICK, seed=3, log=None):
-    return diagnose([("a", log or noisy(*terms, seed=seed))], CAR, model=model, options=options)
+def told(*terms, model=None, options=QUICK, seed=3, log=None, progress=None):
+    return diagnose([("a", log or noisy(*terms, seed=seed))], CAR, model=model, options=options, progress=progress)
+
+
+@cache
+def watched(*masses):
+    """A diagnosis among the few effects, with its views, and what it said meanwhile: text and share."""
+    seen = []
+    loads = [term("payload_mass", delta_mass=m) for m in masses]
+    d = told(*loads, options=replace(QUICK, views=True), progress=lambda *said: seen.append(said))
+    return d, seen
 
 
 def keys(d):
@@ -52,7 +62,7 @@ def keys(d):
 
 
 def test_no_effect():
-    d = told()
+    d, _ = watched()
     assert d.verdict == "no_effect"
     assert d.sentence == "No effect: the model agrees with the measurement, at a false-alarm level of 0.01."
     assert (d.causes, d.gain, d.model) == ((), None, Model())
@@ -61,7 +71,7 @@ def test_no_effect():
 
 
 def test_named_with_its_size_and_gain():
-    d = told(term("payload_mass", delta_mass=250.0))
+    d, _ = watched(250.0)
     assert d.verdict == "named"
     assert keys(d) == {"payload_mass"}
     assert d.causes[0].probability > 0.95
@@ -226,8 +236,7 @@ def test_two_runs_are_equal_and_another_seed_says_the_same():
 
 
 def test_progress_is_told_and_rises():
-    seen = []
-    diagnose([("a", noisy())], CAR, options=QUICK, progress=lambda text, share: seen.append((text, share)))
+    _, seen = watched()
     shares = [s for _, s in seen]
     assert len({t for t, _ in seen}) >= 3
     assert np.all(np.diff(shares) > -1e-9)
@@ -236,9 +245,7 @@ def test_progress_is_told_and_rises():
 
 
 def test_a_first_answer_is_shown_while_the_rest_is_done():
-    seen = []
-    log = noisy(term("payload_mass", delta_mass=250.0))
-    diagnose([("a", log)], CAR, options=QUICK, progress=lambda text, share: seen.append((text, share)))
+    _, seen = watched(250.0)
     for words, share in (("at first sight", 0.5), ("so far", 0.7)):
         first = next(i for i, (t, _) in enumerate(seen) if words in t)
         assert re.search(rf"{words} payload mass \((0\.\d\d|1\.00)\)", seen[first][0])
@@ -246,7 +253,7 @@ def test_a_first_answer_is_shown_while_the_rest_is_done():
 
 
 def test_views_hold_the_residual_before_and_after():
-    d = told(term("payload_mass", delta_mass=250.0), options=replace(QUICK, views=True))
+    d, _ = watched(250.0)
     view = next(v for v in d.views if v.channel == "force_balance")
     assert np.nanstd(view.after) < 0.8 * np.nanstd(view.before)
     assert {"t", "v_x", "torque"} <= set(view.coordinates)
@@ -309,7 +316,9 @@ def test_no_name_where_the_drive_itself_is_predicted_worse(monkeypatch):
 
 def test_a_force_with_a_name_is_no_slope_of_the_road(monkeypatch):
     ask(monkeypatch, [f"brake_drag@{at}" for at in ("fl", "fr", "f")])
-    hilly = Spec("hilly", "gusts", (Hidden("brake_drag", "f", {"torque": 60.0}),), 8, "compact_fwd", holdout=0)
+    hilly = Spec(
+        "hilly", "gusts", (Hidden("brake_drag", "f", {"torque": 60.0}),), 8, "compact_fwd", duration_s=150.0, holdout=0
+    )
     d = diagnose(make_case(hilly).drives, CARS["compact_fwd"], options=QUICK)
     assert keys(d) == {"brake_drag@f", "road_grade"}
     mean, (_, road) = d.causes[1].parameters["grade_mean"], clean_rows(hilly, world_of(hilly))
@@ -319,7 +328,9 @@ def test_a_force_with_a_name_is_no_slope_of_the_road(monkeypatch):
 def test_a_road_that_falls_on_the_whole_has_its_mean(monkeypatch):
     """Its constant slope is a cause as well, and part of the same road."""
     ask(monkeypatch, ("road_grade",))
-    hilly = Spec("hilly", "gusts", (Hidden("road_grade", None, {"grade": -0.03}),), 8, "compact_fwd", holdout=0)
+    hilly = Spec(
+        "hilly", "gusts", (Hidden("road_grade", None, {"grade": -0.03}),), 8, "compact_fwd", duration_s=150.0, holdout=0
+    )
     d = diagnose(make_case(hilly).drives, CARS["compact_fwd"], options=QUICK)
     _, road = clean_rows(hilly, world_of(hilly))
     e = d.causes[0].parameters["grade_mean"]
@@ -345,7 +356,7 @@ def test_drives_need_names_of_their_own():
 
 def test_the_road_of_one_of_two_drives(monkeypatch):
     ask(monkeypatch, ("payload_mass", "road_grade"))
-    flat = Spec("mixed", "gusts", (), 8, "compact_fwd", holdout=0)
+    flat = Spec("mixed", "gusts", (), 8, "compact_fwd", duration_s=150.0, holdout=0)
     (_, a), (_, b) = (make_case(s).drives[0] for s in (flat, replace(flat, programme="hilly")))
     d = diagnose([("a", a), ("b", b)], CARS["compact_fwd"], options=QUICK)
     assert [(c.key, c.drives) for c in d.causes] == [("road_grade", ("b",))]

@@ -14,7 +14,7 @@ from aqualog.model import programme
 from aqualog.thesis.evidence.campaign import Evidence
 from aqualog.thesis.run import make
 
-PER_CONFIGURATION = 6
+PER_CONFIGURATION = 4
 
 
 def configuration(run):
