@@ -7,7 +7,7 @@ from tests.blind.world.cases import Hidden, Spec
 
 __all__ = ["small_jobs"]
 
-_LENGTH_S = 75.0
+_LENGTH_S = 60.0
 
 
 def small_jobs(seeds_from: int = 1) -> list[Job]:
@@ -15,7 +15,7 @@ def small_jobs(seeds_from: int = 1) -> list[Job]:
     cases = (
         ("null", Spec("mixed", "ou1", (), vehicle="sedan_rwd")),
         ("null", Spec("handling", "pink", (), vehicle="compact_fwd")),
-        ("named", Spec("mixed", "ou1", (Hidden("aero_drag", None, {"delta_drag_area": 0.3}),), vehicle="sedan_rwd")),
+        ("named", Spec("mixed", "ou1", (Hidden("aero_drag", None, {"delta_drag_area": 0.5}),), vehicle="sedan_rwd")),
         ("named", Spec("mixed", "white", (Hidden("tyre_radius", "fl", {"delta": -0.01}),), vehicle="compact_fwd")),
         ("named", Spec("handling", "ou01", (Hidden("signal_delay", "a_x", {"delay": 0.1}),), vehicle="suv_awd")),
     )
