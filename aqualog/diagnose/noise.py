@@ -213,14 +213,16 @@ def _whiten(x, rotation, shares, weights, shaping, kept, out):  # type: ignore[n
             z[:MEMORY] = now[:10].mean()
             for t in range(n + MEMORY):
                 total[t + 1] = total[t] + z[t]
-            own[:] = now
+            for t in range(n):  # an assignment of arrays compiles a message about shapes, for 3 s
+                own[t] = now[t]
             for b in range(0, _EDGES.size, 4):
                 p, q, r, s = shares[c, b], shares[c, b + 1], shares[c, b + 2], shares[c, b + 3]
                 P, Q = total[MEMORY - _EDGES[b] :], total[MEMORY - _EDGES[b + 1] :]
                 R, S = total[MEMORY - _EDGES[b + 2] :], total[MEMORY - _EDGES[b + 3] :]
                 for t in range(n):
                     own[t] -= p * P[t] + q * Q[t] + r * R[t] + s * S[t]
-            own *= weights[c]
+            for t in range(n):
+                own[t] *= weights[c, t]
             for t in range(m if m < n else 0):
                 own[t] = own[kept[t]]  # they ascend
         for c in range(C):

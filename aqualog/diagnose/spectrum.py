@@ -78,7 +78,9 @@ def _unrelated(lines, inverse, out):  # type: ignore[no-untyped-def]
         n = min(TILE, F - low)
         at = slice(low, low + n)
         for i in range(k):
-            x[0, :, :n], x[1, :, :n] = lines[i, :, at].real, lines[i, :, at].imag
+            for c in range(C):
+                for f in range(n):  # an assignment of arrays compiles a message about shapes, for 3 s
+                    x[0, c, f], x[1, c, f] = lines[i, c, low + f].real, lines[i, c, low + f].imag
             for c in range(C):
                 re[:] = 0.0
                 im[:] = 0.0
@@ -87,8 +89,8 @@ def _unrelated(lines, inverse, out):  # type: ignore[no-untyped-def]
                     for f in range(n):
                         re[f] += a[f] * p[f] - b[f] * q[f]
                         im[f] += a[f] * q[f] + b[f] * p[f]
-                out[i, 0, c, at] = re[:n]
-                out[i, 1, c, at] = im[:n]
+                for f in range(n):
+                    out[i, 0, c, low + f], out[i, 1, c, low + f] = re[f], im[f]
 
 
 def weighing(residuals: Sequence[FloatArray] | FloatArray, mask: BoolArray, contrasts: FloatArray) -> Weighing:

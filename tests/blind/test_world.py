@@ -228,6 +228,12 @@ def signature(name, signals, vehicle):
     }[name]
 
 
+@cache
+def left_without_effects(vehicle):
+    spec = cases.Spec("mixed", "white", seed=3, vehicle=vehicle, duration_s=120.0)
+    return np.nanmean(unexplained(cases.clean_drive(spec, ()), cases.CARS[vehicle]))
+
+
 @pytest.mark.parametrize(
     ("effect", "where", "values"),
     [
@@ -248,12 +254,10 @@ def signature(name, signals, vehicle):
 @pytest.mark.parametrize("vehicle", ["sedan_rwd", "compact_fwd", "suv_awd"])
 def test_force_effects_have_their_size(effect, where, values, vehicle):
     spec = cases.Spec("mixed", "white", hide(effect, where, **values), seed=3, vehicle=vehicle, duration_s=120.0)
-    seen, nominal = cases.clean_pair(spec)
-    car = cases.CARS[vehicle]
-    base = unexplained(nominal, car)
+    seen, car = cases.clean_drive(spec, cases.truth(spec)), cases.CARS[vehicle]
     name, x = next(iter(values.items()))
     size = x - 1.0 if name == "gain" else x
-    measured = fit(signature(effect, seen, car), unexplained(seen, car) - np.nanmean(base))
+    measured = fit(signature(effect, seen, car), unexplained(seen, car) - left_without_effects(vehicle))
     assert measured == pytest.approx(size, rel=0.06)
 
 

@@ -254,9 +254,9 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
 def advance(t, share, y, f, before, aux, fine, slow, p, odd, drive, brake, gear, steer, gust, linger, braked):
     """One step; `before` are the derivatives of the last step, `braked` (4,) gets the brakes' torques [N m]."""
     _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, linger)
-    if t <= 0.0:  # the first step is Euler's
-        before[:] = f
     for k in range(STATES):
+        if t <= 0.0:  # the first step is Euler's; an assignment of arrays compiles a message about shapes, for 3 s
+            before[k] = f[k]
         y[k] += H * (1.5 * f[k] - 0.5 * before[k])
         before[k] = f[k]
     for i in range(4):
