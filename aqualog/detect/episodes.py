@@ -15,7 +15,7 @@ from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import Event, FloatArray
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.registry import all_of
-from aqualog.detect.resistance import RESISTANCE
+from aqualog.detect.resistance import LATEST, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 from aqualog.detect.spin import SPIN_DOWN
 from aqualog.detect.spin_up import SPIN_UP
@@ -79,7 +79,7 @@ class Way:
         return np.array([np.interp(t_s, t, x) for x in sums[:, beside]])
 
 
-def episodes_of(events: Sequence[Event], way: Stretch) -> tuple[Episode, ...]:
+def episodes_of(events: Sequence[Event], way: Stretch, *, warns: bool = False) -> tuple[Episode, ...]:
     """Group the detections of one drive into episodes.
 
     Parameters
@@ -88,6 +88,8 @@ def episodes_of(events: Sequence[Event], way: Stretch) -> tuple[Episode, ...]:
         Of one drive.
     way : callable
         As `Way.between`.
+    warns : bool
+        Whether the margin ran, whose warnings show how far the water goes.
 
     Returns
     -------
@@ -97,13 +99,16 @@ def episodes_of(events: Sequence[Event], way: Stretch) -> tuple[Episode, ...]:
     What the water does to the car makes an episode: joint warnings and resistance whose causes are less than 1 s apart.
     Its wheels belong to it as long as they follow without a second's pause. One that was stopped or spun needs seconds
     to find the road's speed again. So wheels neither join two episodes nor move the end of one, and a joint warning
-    that such a wheel sets off, without an alarm of the resistance, belongs to the episode before. Other detections are
+    that such a wheel sets off, without an alarm of the resistance, belongs to the episode before. A trailer or the wind
+    holds a car back for minutes. So resistance reaches at most 2 s before the first joint warning or warning of the
+    margin in it, the time in which water is reported, and 1 s behind the last. Other detections are
     one episode where less than 1 s lies between them. What began under a braking force is apart: lock-ups less than 3 s
     from each other are one braking, and a lock-up within an episode of aquaplaning belongs to it.
     """
     numbered = [x for x in enumerate(events) if x[1].detector not in _WARNINGS]
     free = [x for x in numbered if not _is_braking(x[1])]
-    water = [_Water(group) for group in _groups([x for x in free if x[1].detector in _FORCES], GAP_S)]
+    warned = [_cause(e) for e in events if e.detector in _WARNINGS] if warns else None
+    water = [_Water(group, warned) for group in _groups([x for x in free if x[1].detector in _FORCES], GAP_S)]
     others = _by_begin(x for x in free if x[1].detector not in _FORCES)
     alone = [x for x in others if not any(w.takes(x) for w in _last(water, x))]
     made = [_episode(w.members, way, w.span) for w in _without_echoes(water)]
@@ -160,9 +165,13 @@ def _groups(events: Sequence[_Numbered], gap_s: float) -> list[list[_Numbered]]:
 class _Water:
     """Joint warnings and resistance of one episode, and the detections at wheels that follow them."""
 
-    def __init__(self, forces: Sequence[_Numbered]) -> None:
+    def __init__(self, forces: Sequence[_Numbered], warned: Sequence[tuple[float, float]] | None) -> None:
         self.members = list(forces)
-        self.span = _span(forces)
+        self.span = start, end = _span(forces)
+        signs = [_cause(e) for _, e in forces if e.detector in _JOINT]
+        if signs and warned is not None:
+            begins, ends = zip(*signs, *(x for x in warned if x[0] < end and x[1] > start), strict=True)
+            self.span = max(start, min(begins) - LATEST), min(end, max(ends) + GAP_S)
         self.reach = self.span[1]
 
     def takes(self, item: _Numbered) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Collection, Sequence
 from aqualog.core.judgement import Judgement
 from aqualog.core.records import Event, Unavailable
 from aqualog.detect.episodes import Stretch, episodes_of
+from aqualog.detect.margin.watch import MARGIN
 from aqualog.detect.registry import all_of
 
 __all__ = ["JOINT", "NEVER_TOGETHER", "judge"]
@@ -34,7 +35,7 @@ def judge(
 
     A single detector never decides: without a joint one the verdict is `cannot_be_judged`, whatever the others found.
     """
-    found = episodes_of(events, way)
+    found = episodes_of(events, way, warns=MARGIN.name in ran)
     wet = any(e.kind == "aquaplaning" for e in found)
     if wet or (any(d in ran for d in JOINT) and judged_s >= SHORTEST_S):
         return Judgement("aquaplaning" if wet else "none", (), tuple(ran), found, judged_s)

@@ -44,6 +44,18 @@ def test_one_pass_is_one_episode_with_all_that_is_known_of_it():
     assert e.events == (0, 1, 2, 3, 4, 5)
 
 
+@pytest.mark.parametrize(
+    ("warned", "span"), [((), (36.0, 39.6)), ((20.0, 50.0), (18.0, 51.0)), ((2.0, 61.0), (1.0, 61.0))]
+)
+def test_resistance_alone_does_not_make_an_episode_longer_than_the_water(warned, span):
+    """A trailer holds a car back for a minute; a joint warning of 0.6 s in it is no minute of aquaplaning."""
+    events = [event("resistance", 1.0, 61.0), event("joint_cusum", 38.0, 38.6)]
+    events += [event("margin", *warned)] if warned else []
+    (e,) = judge(events, [], ("resistance", "joint_cusum", "margin"), judged_s=70.0, way=way).episodes
+    assert (e.start_s, e.end_s) == pytest.approx(span)
+    assert judge(events, [], ("joint_cusum",), judged_s=70.0, way=way).episodes[0].end_s == 61.0
+
+
 def test_less_than_a_second_between_detections_joins_them():
     parts = [event("joint_criteria", 1.0, 3.0), event("joint_criteria", 3.9, 5.0), event("joint_criteria", 6.1, 7.0)]
     assert kinds(*parts) == [("aquaplaning", 1.0, 5.0), ("aquaplaning", 6.1, 7.0)]

@@ -1,7 +1,8 @@
 """Learn what water and dry roads show: `aqualog/detect/margin/emissions.toml`.
 
-    python -m tests.margin.learn --passes 5400 --drives 24 --keep /tmp/windows.npz
+    python -m tests.margin.learn --passes 5400 --one-side 4500 --drives 24 --keep /tmp/windows.npz
     python -m tests.margin.learn --same-roads    # kinds of road stay as the file has them
+    python -m tests.margin.learn --passes 0      # only water under one side is learnt, the rest stays
 
 Windows come from passes whose tyres are drawn by `passes.any_tyre`, from dry drives of the tuning pool, and from drives
 on snow, ice and gravel. What is compared with is learnt from the dry road before, by the filter itself, which is told
@@ -43,7 +44,12 @@ LAW_SD = 0.20  # [-] log of a tyre's full speed about a law
 BANDWIDTH = 0.06  # [-] of the log ratio
 SHARP = 1.0  # how surely a slip of 1 in its feature tells which way a wheel goes
 SHARES = (0.6, 0.1, 0.3)  # of `LAWS` (K)
-KINDS = 8  # of dry road, as many of wet, and of other surfaces
+OF_TEN = (0, 0, 0, 0, 0, 0, 1, 2, 2, 2)  # the same among passes with water under one side alone
+ONE_SIDE, SHARE_ONE = (
+    len(LAWS),
+    0.25,
+)  # its law, of all others together, and its share of wet road, that of snow above (K)
+KINDS, KINDS_ONE = 8, 4  # of dry road, as many of wet, and of other surfaces; of each of these under one side
 LEAST = 1e-3  # [-] of a variance
 _N, _Z = len(state.FEATURES), state.COVARIATES
 _TAIL = FilterParams._field_defaults["tail"]
@@ -73,13 +79,13 @@ def laws_of(x, z, where, share):
     return mean, scatter
 
 
-def kinds_of(x, z, rng):
+def kinds_of(x, z, rng, kinds=KINDS):
     """Means by covariates (the first is 1), covariances and shares of kinds of windows: a mixture of Student's laws."""
-    mean = np.zeros((KINDS, _N, _Z))
-    mean[:, :, 0] = x[rng.choice(len(x), KINDS, replace=False)]
+    mean = np.zeros((kinds, _N, _Z))
+    mean[:, :, 0] = x[rng.choice(len(x), kinds, replace=False)]
     used = z.shape[1]
-    S = np.tile(np.cov(x.T), (KINDS, 1, 1))
-    share = np.full(KINDS, 1.0 / KINDS)
+    S = np.tile(np.cov(x.T), (kinds, 1, 1))
+    share = np.full(kinds, 1.0 / kinds)
     for _ in range(150):
         left = x - z @ mean[:, :, :used].transpose(0, 2, 1)
         square = np.einsum("kni,kij,knj->kn", left, np.linalg.inv(S), left)
@@ -136,12 +142,13 @@ def windows(columns, vehicle, dt, *wet):
     return np.array(rows)
 
 
-def of_passes(first, number):
+def of_passes(first, number, one_side=False):
     """Rows of drivetrain, kind of road (0 dry, 1 water, 2 its edge, `OTHER`), law of contact, log ratio, contact share,
     window."""
     for n in range(number):
-        law = n // 3 % len(LAWS)
-        p = own_pass(first + n, DRIVETRAINS[n % 3], distance=DISTANCE, law=law)
+        law = OF_TEN[n // 3 % 10] if one_side else n // 3 % len(LAWS)
+        p = own_pass(first + n, DRIVETRAINS[n % 3], distance=DISTANCE, law=law, one_side=one_side)
+        law = ONE_SIDE if one_side else law
         x = windows(p.columns, p.vehicle, p.dt, p.wet)
         contact = 0.5 * (p.columns["true_contact_fl"] + p.columns["true_contact_fr"])
         for road, times in ((1, WATER), (2, EDGE)):
@@ -161,9 +168,9 @@ def of_drives(first, number):
         yield from ((DRIVETRAINS.index(drawn.believed.drivetrain), 0, 0, np.nan, np.nan, *row) for row in x[30::5])
 
 
-def of_others(first, number):
+def of_others(first, number, one_side=False):
     """The same of minutes partly on snow, ice or gravel of laws drawn far wider than sources have them, where wheels
-    grip: one that spins is no matter of the margin.
+    grip: one that spins is no matter of the margin. `one_side`: all with asphalt under the other side.
     """
     for n in range(number):
         rng = np.random.default_rng([first + n, 80])
@@ -173,7 +180,8 @@ def of_others(first, number):
         k = Drawing(rng, pool, car, tyre, rng.uniform(1.8e5, 2.8e5), int(rng.integers(2**31)))
         compliance, mu = k.one_of(0.0, *[0.01 * 12.5 ** rng.uniform()] * 6), 0.06 * 12.0 ** rng.uniform()
         other = Surface("other", mu, compliance, 0.05 * rng.uniform() ** 2, k.between(0.0, 70.0))
-        left, right = k.one_of(*[(other, other)] * 6, (other, SURFACES["asphalt"]), (SURFACES["asphalt"], other))
+        split = (other, SURFACES["asphalt"]), (SURFACES["asphalt"], other)
+        left, right = k.one_of(*[(other, other)] * 6 * (not one_side), *split)
         start, v = k.one_of(0.0, k.between(10.0, 20.0)), k.between(42.0, 110.0) * KMH
         speed = k.cruise(60.0, v, spread=k.between(0.02, 0.15), a_most=0.4)
         drive = k.drive(60.0, speed, lanes=(Lane(start, 90.0, surface=left, surface_right=right),))
@@ -182,7 +190,8 @@ def of_others(first, number):
         start = start or k.between(1.0, 4.0)  # who starts on snow takes seconds of it for dry road
         x = windows({s: signals.array(s) for s in signals.symbols}, believed, signals.dt_ns * 1e-9, (start, 90.0))
         x = x[round(start / 0.1) + 5 :: 5]
-        yield from ((n % 3, OTHER, 0, np.nan, np.nan, *row) for row in x if not (np.abs(row[1:3]) > GRIPS).any())
+        law = ONE_SIDE if one_side else 0
+        yield from ((n % 3, OTHER, law, np.nan, np.nan, *row) for row in x if not (np.abs(row[1:3]) > GRIPS).any())
 
 
 def prior(rng, n=4000):
@@ -214,41 +223,54 @@ def of_law(rows):
         yield *laws_of(x[:, :_N], x[:, _N:], ratio, share), contact, ways
 
 
-def learn(found, same_roads=False):
-    """Emissions by drivetrain from rows of windows; with `same_roads` the kinds of road of the file at hand."""
+def learn(found, kept=()):
+    """Emissions by drivetrain from rows of windows; `kept` of the file at hand: "distances" and "roads"."""
     found = found[np.isfinite(found[:, 5:]).all(axis=1)]
     before, tables = prior(np.random.default_rng(5)), {}
+    shares = 0.5 * np.repeat([*((1.0 - SHARE_ONE) * np.array(SHARES)), SHARE_ONE], 2)
     for d, drivetrain in enumerate(DRIVETRAINS):
         own = found[found[:, 0] == d]
         road, law, ratio, x = own[:, 1], own[:, 2], own[:, 3], own[:, 5:]
-        by_law = [way for k in range(len(LAWS)) for way in of_law(own[(road == 1) & (law == k)])]
-        distances = (*(np.array(each) for each in zip(*by_law, strict=True)), 0.5 * np.repeat(SHARES, 2), before)
-        if same_roads:
-            tables[drivetrain] = Emissions(*distances, *emissions.emissions_of(drivetrain)[len(distances) :])
-            continue
-        rng = np.random.default_rng(1)
-        wet = (road > 0) & (road < OTHER) & (ratio < WET)
+        file, rng = emissions.emissions_of(drivetrain), np.random.default_rng(1)
+        is_wet = (road > 0) & (road < OTHER) & (ratio < WET)
         # what slips on snow slips in proportion to the traction; means of water that did so warned on a measured road
-        roads = ((road == 0, 1), (wet, 1), (road == OTHER, _Z))
-        kinds = [kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]
-        m, S, share = (np.concatenate(k) for k in zip(*kinds, strict=True))
-        tables[drivetrain] = Emissions(*distances, m, S, share, np.repeat([0.0, 1.0, 2.0], KINDS))
+        roads = ((road == 0, 1), (is_wet & (law != ONE_SIDE), 1), ((road == OTHER) & (law != ONE_SIDE), _Z))
+        one = (is_wet & (law == ONE_SIDE), 1), ((road == OTHER) & (law == ONE_SIDE), _Z)
+        both = 2 * len(LAWS)
+        distances = [
+            *(zip(*(t[:both] for t in file[:4]), strict=True) if "distances" in kept else
+              (way for k in range(len(LAWS)) for way in of_law(own[(road == 1) & (law == k)]))),
+            *of_law(own[(road == 1) & (law == ONE_SIDE)]),
+        ]  # fmt: skip
+        m, S, share = (np.concatenate(k) for k in zip(
+            *([[t[: 3 * KINDS] for t in file[6:9]]] if "roads" in kept else
+              [kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]),
+            *(kinds_of(x[some, :_N], x[some, _N : _N + used], rng, KINDS_ONE) for some, used in one), strict=True,
+        ))  # fmt: skip
+        of = np.repeat([0.0, 1.0, 2.0, 1.0, 3.0], [*[KINDS] * 3, *[KINDS_ONE] * 2])
+        is_one = np.arange(of.size) >= 3 * KINDS
+        for some, whole in (((of == 1.0) & ~is_one, 1.0 - SHARE_ONE), ((of == 1.0) & is_one, SHARE_ONE)):
+            share[some] *= whole / share[some].sum()
+        by_law = (np.array(each) for each in zip(*distances, strict=True))
+        tables[drivetrain] = Emissions(*by_law, shares, before, m, S, share, of)
     return tables, len(found)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, default in (("passes", 5400), ("drives", 24), ("others", 600), ("first", 100_000)):
+    for name, default in (("passes", 5400), ("one-side", 4500), ("drives", 24), ("others", 600), ("first", 100_000)):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--keep", type=Path, default=Path("windows.npz"), help="file of windows, taken where it exists")
     parser.add_argument("--same-roads", action="store_true", help="learn distances, and keep the file's kinds of road")
     a = parser.parse_args()
+    kept = ("roads",) * (a.same_roads or not a.passes) + ("distances",) * (not a.passes)
     if not a.keep.exists():
-        roads = () if a.same_roads else (*of_drives(a.first, a.drives), *of_others(a.first, a.others))
-        np.savez(a.keep, x=np.array((*of_passes(a.first, a.passes), *roads)))
-    tables, n = learn(np.load(a.keep)["x"], a.same_roads)
-    roads = ", kinds of road from before" * a.same_roads
-    note = f"Made by `python -m tests.margin.learn` from {n:,} windows{roads}."
+        roads = () if kept else (*of_drives(a.first, a.drives), *of_others(a.first, a.others))
+        wet = *of_passes(a.first, a.passes), *of_passes(a.first, a.one_side, one_side=True)
+        np.savez(a.keep, x=np.array((*wet, *roads, *of_others(a.first, a.one_side // 10, one_side=True))))
+    tables, n = learn(np.load(a.keep)["x"], kept)
+    before = f", {' and '.join(kept)} of before" if kept else ""
+    note = f"Made by `python -m tests.margin.learn` from {n:,} windows{before}."
     target = Path(emissions.__file__).with_name("emissions.toml")
     target.write_text("\n".join(text_of(tables, note)) + "\n", encoding="utf-8")
 

@@ -98,12 +98,12 @@ def any_tyre(tyre: Tyre, rng: np.random.Generator, exponents: tuple[float, float
 
 def own_pass(
     seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE, law: int | None = None,
-    run: int = 0,
+    run: int = 0, one_side: bool = False,
 ) -> Pass:  # fmt: skip
     """A pass of the project's simulator at about one speed: tyre, pressure, water and car are drawn.
 
     `law`: one of `LAWS`, with the others drawn by `any_tyre`, to learn from. `run`: another pass of the same tyre,
-    water and car.
+    water and car. `one_side`: no water on the left.
     """
     broad = law is not None
     rng = np.random.default_rng([seed, 79 if broad else 77])
@@ -131,7 +131,7 @@ def own_pass(
     start = (v - a * 4.0) * (approach - 4.0) + 4.0 * (v - 2.0 * a)
     calm = float(0.03 ** k.rng.uniform()) if broad else 1.0
     lane = Lane(
-        start, start + stay * v, in_metres=True, depth_left=depth * k.between(0.6, 1.0), depth_right=depth,
+        start, start + stay * v, in_metres=True, depth_left=depth * k.between(0.6, 1.0) * (not one_side), depth_right=depth,
         irregularity_left=calm * k.between(0.05, 0.4), irregularity_right=calm * k.between(0.03, 0.4 if broad else 0.15),
     )  # fmt: skip
     speed = ((0.0, v - 4.0 * a), (approach - 4.0, v - 4.0 * a), (approach, v), (approach + stay, v + stay * a))

@@ -27,6 +27,7 @@ from aqualog.report.drive.report import drive_report
 from tests.drives import CAR, FWD, drive, lane
 from tests.margin.learn import DRIVETRAINS, inputs_of, windows
 from tests.margin.passes import LAWS, any_tyre, own_full, own_pass
+from tests.margin.study import outcome
 
 KMH = 3.6
 CHI2_95 = 11.07  # of five features
@@ -44,18 +45,20 @@ def test_emissions_are_a_law(drivetrain):
     t = emissions_of(drivetrain)
     assert (np.diff(t.contact) >= 0.0).all()
     assert (t.contact[:, -1] > t.contact[:, 0] + 0.3).all()
-    usual, early, late = t.contact[::2, np.argmin(np.abs(NODES - 0.3))]
+    usual, early, late, one_side = t.contact[::2, np.argmin(np.abs(NODES - 0.3))]
+    assert one_side > usual  # the mean of the axle
     assert early < usual < late
     assert np.logaddexp(t.ways[::2], t.ways[1::2]) == pytest.approx(0.0, abs=1e-3)
     at = t.mean @ np.array([1.0, 0.0, np.arcsinh(1.5)])  # 108 km/h, a steady car
     near, far = (int(np.argmin(np.abs(NODES - x))) for x in (0.0, 0.6))
-    size = (np.exp(t.ways)[:, :, None] * np.abs(at)).reshape(3, 2, NODES.size, 5).sum(axis=1)
-    assert (size[:, near] > size[:, far]).all()
+    size = (np.exp(t.ways)[:, :, None] * np.abs(at)).reshape(4, 2, NODES.size, 5).sum(axis=1)
+    assert (size[:3, near] > size[:3, far]).all()
+    assert (size[3, near] > size[3, far])[[0, 1, 3]].all()  # on the other side the road is dry
     assert (2.0 * t.law[::2] @ (size[:, near] - size[:, far]) > 0.3).all()
     assert (np.linalg.eigvalsh(np.concatenate([*t.scatter, t.kind_scatter])) > 0.0).all()
     assert (t.prior.sum(), t.law.sum()) == pytest.approx((1.0, 1.0), abs=1e-3)
     p = params(CAR, 0.1)
-    standing = Inputs(*np.zeros((9, 300_000)))
+    standing = Inputs(*np.zeros((10, 300_000)))
     assert scan(p, t, Filter.new(p, t), standing)[1].kinds.sum() == pytest.approx(1.0, abs=1e-6)
 
 
@@ -84,7 +87,7 @@ def test_emissions_are_those_of_these_features(drivetrain):
 def test_a_mixture_of_laws_is_between_them():
     q, t = own_pass(12, "rwd"), emissions_of("rwd")
     p, x, k = params(q.vehicle, q.dt), inputs_of(q.columns, q.vehicle, q.dt), round((q.wet[0] + 2.0) / q.dt)
-    each = [t._replace(law=law) for law in (t.law, *0.5 * np.repeat(np.eye(3), 2, axis=1))]
+    each = [t._replace(law=law) for law in (t.law, *0.5 * np.repeat(np.eye(4), 2, axis=1))]
     each.insert(1, t._replace(ways=t.ways[::-1].copy()))  # as rows of another order, the recursion is compiled again
     mixed, rare, *alone = (scan(p, own, Filter.new(p, own), x)[0][-1, k] for own in each)
     assert min(alone) + 0.5 < mixed < max(alone) - 0.5
@@ -205,6 +208,49 @@ def test_without_torque_it_does_not_run():
     signals, _ = drive(CAR, duration_s=8.0, lanes=(), drop=("torque_rl", "torque_rr"))
     found = {u.detector: u.missing for u in detect_drive(signals, CAR).unavailable}
     assert found["margin"] == ("torque_rl", "torque_rr")
+
+
+@pytest.mark.parametrize("seed", [1, 4, 7, 10, 13])
+def test_water_under_one_side_of_a_car_with_front_wheel_drive(seed):
+    """Its wheels on the other side are those of a dry road, and its drag is half."""
+    p = own_pass(seed, "fwd", distance=(5.0 / KMH, 20.0 / KMH), one_side=True)
+    true, median, low, high, *_, warned, early = outcome(p)
+    assert low <= true <= high
+    assert abs(median - true) < 15.0
+    assert warned
+    assert not early
+
+
+def rough(seed=3):
+    """A dry drive that speeds up, and whose accelerometer shakes by 0.8 m/s² from 15 s on."""
+    columns = drive(CAR, duration_s=30.0, lanes=(), speed_kmh=((0.0, 80.0), (30.0, 114.0)))[1]
+    noise = 0.8 * np.random.default_rng(seed).standard_normal(3000) * (np.arange(3000) >= 1500)
+    return {**columns, "a_x": columns["a_x"] + noise[: columns["a_x"].size]}
+
+
+def test_what_is_let_through_is_not_chosen_by_the_noise_of_the_accelerometer():
+    """Samples of low acceleration are samples of high resistance: of those alone it was 0.2 m/s²."""
+    R = inputs_of(rough(), CAR, 0.01).R
+    assert np.isfinite(R[2000:]).mean() > 0.9
+    assert np.nanmean(R[2000:]) == pytest.approx(np.nanmean(R[500:1500]), abs=0.05)
+
+
+def test_resistance_is_as_unsure_as_the_accelerometer_shakes():
+    x, p, t = inputs_of(rough(), CAR, 0.01), params(CAR, 0.01), emissions_of("rwd")
+    calm, shaken = (scan(p, t, Filter.new(p, t), Inputs(*(y[:n] for y in x)))[1] for n in (1480, 2500))
+    assert shaken.x[1, 0] > 10.0 * calm.x[1, 0]
+    assert shaken.body[2] > 2.0 > 0.5 > calm.body[2]
+    assert shaken.x[1, 3] > shaken.body[2] ** 2  # shake of wheels says nothing there
+    assert shaken.kinds[t.road == 1].sum() < 0.1
+
+
+def test_the_air_of_a_trailer_is_no_water():
+    """A car of twice the drag area speeds up: the offset that it learnt at 60 km/h does not hold at 125 km/h."""
+    wide = replace(CAR, drag_area=CAR.drag_area + 1.2)
+    speed = ((0.0, 60.0), (20.0, 60.0), (70.0, 125.0), (80.0, 125.0))
+    columns = drive(wide, duration_s=80.0, lanes=(), speed_kmh=speed)[0]
+    found = detect_drive(columns, CAR)
+    assert found.features["water_probability"].max() < 0.5
 
 
 DRY = (

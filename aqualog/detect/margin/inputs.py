@@ -17,6 +17,7 @@ __all__ = ["Reader"]
 
 V_MIN = 5.0  # [m/s] slower, wheel speeds are too coarse
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering costs more than the balance knows
+TAU_A = 0.5  # [s] of the acceleration that these limits are for, about the window's length
 A_MOST, A_LEAST = 0.5, -1.5  # [m/s^2] beyond, an unknown trailer shows more than water; braking
 U_MAX = 0.25  # [-] of the traction: beyond, the slip of a dry tyre is no longer a line
 LOAD_LEAST = 100.0  # [N] of a wheel that lifts off in a curve
@@ -34,13 +35,16 @@ class Reader:
         self._vehicle = vehicle
         self._dt = dt
         self._slow = {"f": UNSET, "r": UNSET}
+        self._a = UNSET
         self._left = 0
         self._unchanged = dict.fromkeys((f"{stem}_{w}" for stem in ("omega", "torque") for w in WHEELS), (UNSET, 0))
 
     def push(self, scene: Scene) -> Inputs:
         """Return the inputs of the next piece, (n,)."""
         f = scene.f
-        v, a = f["v_x_hat"], f["a_kin_slow"]
+        v = f["v_x_hat"]
+        # slow, or it would let through what the noise of the accelerometer makes low: that looked like water
+        a, self._a = lowpass(f["a_kin_slow"], self._a, tau=TAU_A, dt=self._dt)
         none = np.full(scene.size, np.nan)
         u = self._traction(scene)
         jump = self._jumps(u[0] + u[1], u[2] + u[3])
@@ -58,7 +62,7 @@ class Reader:
                 small = np.maximum(np.abs(u[i]), np.abs(u[2 + i])) < U_MAX
             sides.append(np.where(trusted & small, slip, np.nan))
         # of the torques, not the accelerometer: that is in the resistance too, and its noise would make a slope of them
-        return Inputs(v, f["delta_a_x"] + scene.columns["a_x"], R, *sides, *u)
+        return Inputs(v, f["delta_a_x"] + scene.columns["a_x"], R, *sides, *u, a_x=scene.columns["a_x"])
 
     def _turning(self, scene: Scene, wheel: str) -> FloatArray | None:
         """Speed of a wheel on the centre line, NaN where its signal stands still. [m/s]"""

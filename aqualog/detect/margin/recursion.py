@@ -37,8 +37,9 @@ _QUANTILES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 _SURE = 1.645  # standard deviations of a quantile of 95 %
 _STILL = 0.25  # variance of what wheels shake that shake as on dry road, of 0.6 s in log variance
 _UNKNOWN = 1e4  # variance of a feature that is missing
-_V, _A, _R, _D, _U_F, _U_R, _VAR, _S_F, _S_R = 0, 1, 2, 3, 5, 7, 9, 11, 13  # columns of a step
-_LEAST = 1e-10  # of a slip's variance
+_V, _A, _R, _D, _U_F, _U_R, _B, _VAR, _VAR_B, _S_F, _S_R = 0, 1, 2, 3, 5, 7, 9, 10, 12, 13, 15  # columns of a step
+_NI = len(Inputs._fields)
+_LEAST, _LEAST_B = 1e-10, 1e-5  # of a slip's variance, and of the accelerometer's [(m/s^2)^2]
 
 
 @part
@@ -67,13 +68,29 @@ def _learn_line(s, x, left, lasting, trust, tail):  # type: ignore[no-untyped-de
 
 
 @part
+def _drag(g, a, v2):  # type: ignore[no-untyped-def]
+    """Resistance of the dry road, and what its coefficients' covariance makes of that: its variance, and the gains."""
+    known = g[0, 0] + g[0, 1] * a + g[0, 2] * v2
+    one = g[1, 0] + g[1, 1] * a + g[1, 2] * v2
+    two = g[2, 0] + g[2, 1] * a + g[2, 2] * v2
+    three = g[3, 0] + g[3, 1] * a + g[3, 2] * v2
+    return known, one + two * a + three * v2, (one, two, three)
+
+
+@part
 def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
     """Learn what the car shows on dry road from the step that has just left the window."""
     g = m.R
-    g[2] = min(g[2] + p.walk_R**2 * p.dt, p.offset_R**2)
-    g[4] = min(g[4] + p.walk_a**2 * p.dt, p.share_a**2)
+    g[1, 0] = min(g[1, 0] + p.walk_R**2 * p.dt, p.offset_R**2)
+    g[2, 1] = min(g[2, 1] + p.walk_a**2 * p.dt, p.share_a**2)
     if not math.isnan(row[_R] + row[_A]):
-        _learn_line(g, row[_A], row[_R] - g[0] - g[1] * row[_A], p.noise_R**2, trust, p.tail)
+        known, S, gain = _drag(g, row[_A], (row[_V] / p.pace) ** 2)
+        left, S = row[_R] - known, S + p.noise_R**2 + m.samples[2]
+        share = trust * (p.tail + 1.0) / ((p.tail + max(left * left / S, 1.0)) * S)
+        for i in range(3):
+            g[0, i] += share * gain[i] * left
+            for j in range(3):
+                g[1 + i, j] -= share * gain[i] * gain[j]
     for i in range(2):
         g = m.sides[i]
         g[2] = min(g[2] + p.walk_D**2 * p.dt, p.offset_D**2)
@@ -86,10 +103,30 @@ def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
 
 
 @part
+def _shake_of_body(m):  # type: ignore[no-untyped-def]
+    """Log variance of the specific force within the steps of the window, NaN where samples are too rare for one."""
+    n, within = 0.0, 0.0
+    for k in range(ROWS):
+        if m.window[k, _VAR_B] > 0.0:
+            n, within = n + 1.0, within + m.window[k, _VAR_B]
+    return math.log(within / n + _LEAST_B) if n >= 3.0 else math.nan
+
+
+@part
+def _learn_shake(p, g, own, dry):  # type: ignore[no-untyped-def]
+    """Learn a log variance of the dry road, `g[0]`; its variance follows it."""
+    g[1] = min(g[1] + p.walk_M**2 * p.dt, p.offset_M**2)
+    if not math.isnan(own):
+        gain = dry * g[1] / (g[1] + p.noise_M**2)
+        g[0] += gain * (own - g[0])
+        g[1] *= 1.0 - gain
+
+
+@part
 def _gather(p, m):  # type: ignore[no-untyped-def]
     """Fill the features of the window, and the variances of what they are compared with; return mean traction."""
     x, P = m.x[0], m.x[1]
-    n, r, f, traction, steps = 0.0, 0.0, 0.0, 0.0, 0.0
+    n, r, r2, f, v2, traction, steps = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(ROWS):
         row = m.window[k]
         u = row[_U_F] + row[_U_F + 1] + row[_U_R] + row[_U_R + 1]
@@ -97,14 +134,20 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
             traction += 0.5 * u
             steps += 1.0
         if not math.isnan(row[_R] + row[_A]):
-            r += row[_R] - m.R[0] - m.R[1] * row[_A]
-            f += row[_A]
-            n += 1.0
+            square = (row[_V] / p.pace) ** 2
+            away = row[_R] - _drag(m.R, row[_A], square)[0]
+            n, r, r2, f, v2 = n + 1.0, r + away, r2 + away * away, f + row[_A], v2 + square
     x[0], P[0] = 0.0, _UNKNOWN
     if n >= 3.0:
-        r, f = r / n, f / n
+        r = r / n
         x[0] = math.asinh(r / p.scale_R)
-        P[0] = (m.R[2] + 2.0 * f * m.R[3] + f * f * m.R[4]) / (p.scale_R**2 + r * r)
+        # what shakes the accelerometer leaves the mean of few steps unsure
+        m.samples[2] = max(r2 - n * r * r, 0.0) / (n - 1.0)
+        P[0] = (_drag(m.R, f / n, v2 / n)[1] + m.samples[2] / n) / (p.scale_R**2 + r * r)
+    # how much more than on dry road the body shakes: a rough road shakes it and the wheels, water hardly the body
+    shock = _shake_of_body(m)
+    rough = 0.0 if math.isnan(shock) else max(shock - m.body[0], 0.0)
+    m.body[2] = rough
     for i in range(2):
         g = m.sides[i]
         n, e, e2, h, within = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -119,11 +162,11 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
         if n >= 3.0:
             e, h = e / n, h / n
             x[1 + i] = math.asinh(e / p.scale_D)
-            # what shakes on dry road leaves the mean of few samples unsure; a slip within twice of that is none
-            noise = math.exp(g[5]) / (n * p.block)
-            P[1 + i] = (g[2] + 2.0 * h * g[3] + h * h * g[4] + noise) / (p.scale_D**2 + max(e * e - 4.0 * noise, 0.0))
             x[3 + i] = math.log(max(e2 / n - e * e, 0.0) + within / n + _LEAST) - g[5]
-            P[3 + i] = g[6]
+            P[3 + i] = g[6] + rough * rough
+            # what shakes on dry road leaves the mean of few samples unsure; a slip within twice of that is none
+            noise = math.exp(g[5] + max(min(rough, x[3 + i]), 0.0)) / (n * p.block)
+            P[1 + i] = (g[2] + 2.0 * h * g[3] + h * h * g[4] + noise) / (p.scale_D**2 + max(e * e - 4.0 * noise, 0.0))
     more = 1 if P[1] >= _UNKNOWN or (P[2] < _UNKNOWN and abs(x[2]) > abs(x[1])) else 0
     return traction / max(steps, 1.0), more
 
@@ -183,7 +226,7 @@ def _place(log_v, i):  # type: ignore[no-untyped-def]
 
 @part
 def _is(t, m, road):  # type: ignore[no-untyped-def]
-    """Probability of a road: 0 dry, 1 wet, 2 of another surface."""
+    """Probability of a road: 0 dry, 1 wet, 2 of another surface, 3 with one under one side alone."""
     total = 0.0
     for k in range(m.kinds.size):
         if t.road[k] == road:
@@ -251,13 +294,14 @@ def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
 @part
 def _predict(p, t, m):  # type: ignore[no-untyped-def]
     """Let the kinds change into each other over one step."""
-    now = (_is(t, m, 0), _is(t, m, 1), _is(t, m, 2))
-    change = p.among * p.dt
-    out = (p.dt * (p.to_water + p.to_other), p.dt * (p.to_dry + p.mistaken), p.dt * (p.to_dry + p.mistaken))
+    now = (_is(t, m, 0), _is(t, m, 1), _is(t, m, 2), _is(t, m, 3))
+    change, ends = p.among * p.dt, p.dt * (p.to_dry + p.mistaken)
+    out = (p.dt * (p.to_water + p.to_other + p.to_side), ends, ends, ends)
     into = (
-        p.dt * p.to_dry * (now[1] + now[2]),
-        p.dt * (p.to_water * now[0] + p.mistaken * now[2]),
-        p.dt * (p.to_other * now[0] + p.mistaken * now[1]),
+        p.dt * p.to_dry * (now[1] + now[2] + now[3]),
+        p.dt * (p.to_water * now[0] + p.mistaken * (now[2] + now[3])),
+        p.dt * (p.to_other * now[0] + 0.5 * p.mistaken * now[1]),
+        p.dt * (p.to_side * now[0] + 0.5 * p.mistaken * now[1]),
     )
     for k in range(m.kinds.size):
         road = int(t.road[k])
@@ -294,7 +338,8 @@ def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
     drags = P[0] >= _UNKNOWN or x[0] > drag
     # a tyre that loses its air only slips, and alone; a car that rolls easier than before has been taught by water
     both = x[1] * x[2] > 0.0 and abs(x[2]) > max(p.both, _SURE * math.sqrt(P[2])) and x[0] > -drag
-    m.out[8] = 1.0 if drags or both or max(x[3], x[4]) > p.shakes else 0.0
+    shakes = max(x[3], x[4]) > max(p.shakes, _SURE * m.body[2])
+    m.out[8] = 1.0 if drags or both or shakes else 0.0
     m.out[9] = m.out[4] + v
 
 
@@ -321,7 +366,9 @@ def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
     w = s[7]
     speed = max(v, p.v_least)
     x, P = m.x[0], m.x[1]
-    own, known = (x[3], x[4]), (P[3] < _UNKNOWN, P[4] < _UNKNOWN)
+    own = (
+        x[3] + m.sides[0, 5] if P[3] < _UNKNOWN else math.nan, x[4] + m.sides[1, 5] if P[4] < _UNKNOWN else math.nan,
+    )  # fmt: skip
     if more == 1:
         for a in (1, 3):
             x[a], x[a + 1] = x[a + 1], x[a]
@@ -331,20 +378,16 @@ def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
     _weights(p, t, m, speed, w)
     wet, dry = _is(t, m, 1), _is(t, m, 0)
     for i in range(2):
-        g = m.sides[i]
-        g[6] = min(g[6] + p.walk_M**2 * p.dt, p.offset_M**2)
-        if known[i]:
-            gain = dry * g[6] / (g[6] + p.noise_M**2)
-            g[5] += gain * own[i]
-            g[6] *= 1.0 - gain
+        _learn_shake(p, m.sides[i, 5:], own[i], dry)
+    _learn_shake(p, m.body, _shake_of_body(m), dry)
     _fill(p, t, m, v, w, wet)
 
 
 @part
 def _push(p, t, m, x, out, row, s):  # type: ignore[no-untyped-def]
-    """Take samples (9, n) one by one, and fill the rows of what is put out."""
+    """Take samples (inputs, n) one by one, and fill the rows of what is put out."""
     for i in range(x.shape[1]):
-        for c in range(9):
+        for c in range(_NI):
             value = x[c, i]
             if not math.isnan(value):
                 m.sums[0, c] += value
@@ -352,12 +395,11 @@ def _push(p, t, m, x, out, row, s):  # type: ignore[no-untyped-def]
                 m.sums[2, c] += value * value
         m.samples[0] += 1.0
         if m.samples[0] >= p.block:
-            for c in range(9):
+            for c in range(_NI):
                 enough = m.sums[1, c] > 0.0 and m.sums[1, c] >= 0.5 * p.block
                 row[c] = m.sums[0, c] / m.sums[1, c] if enough else math.nan
-            for side in range(2):
-                mean = row[_D + side]
-                row[_VAR + side] = max(m.sums[2, _D + side] / max(m.sums[1, _D + side], 1.0) - mean * mean, 0.0)
+            for at, c in ((_VAR, _D), (_VAR + 1, _D + 1), (_VAR_B, _B)):
+                row[at] = max(m.sums[2, c] / max(m.sums[1, c], 1.0) - row[c] * row[c], 0.0)
             m.sums[:] = 0.0
             m.samples[0] = 0.0
             if not math.isnan(row[_V]):

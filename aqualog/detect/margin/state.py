@@ -27,7 +27,7 @@ OUTPUTS = ("p_water", "p_near", "low", "q25", "median", "q75", "high", "contact"
 """Rows of what a scan returns: probabilities [-], quantiles of the distance [m/s], contact share [-], whether
 drag, shake or the slip of both sides is more than that of the dry road (1 or 0), speed [m/s]."""
 ROWS = 6  # steps of the window
-COLUMNS = 15  # means of a step: inputs, variance of both slips within it, and the slips of dry wheels by the traction
+COLUMNS = 17  # means of a step: inputs, variances of slips and specific force, the slips of dry wheels by the traction
 
 
 class FilterParams(NamedTuple):
@@ -48,21 +48,25 @@ class FilterParams(NamedTuple):
     noise_M: float = 1.0  # [-] of a log variance
     offset_R: float = 0.15  # [m/s^2] before anything is known
     share_a: float = 0.3  # [-] of what the torques make: an unknown trailer or load
+    area: float = 0.2  # [m/s^2] at `pace`: drag area of an unknown trailer or roof box, wind (K)
+    pace: float = 30.0  # [m/s]
     offset_D: float = 5.0e-2  # [-] worn beside new tyres, a spare wheel
     share_D: float = 0.25  # [-] of the slips of both axles: the file's slopes are not the tyres'
     shake: float = -14.0  # [-] log variance of a slip
+    shock: float = -6.0  # [-] log variance of the specific force
     offset_M: float = 2.0  # [-]
     walk_R: float = 0.01  # [m/s^2 / sqrt(s)]
     walk_a: float = 0.003  # [1 / sqrt(s)]
     walk_D: float = 5.0e-5  # [1 / sqrt(s)]
     walk_share: float = 0.002  # [1 / sqrt(s)]
     walk_M: float = 0.03  # [1 / sqrt(s)]
-    to_water: float = 1.0 / 300.0  # [1/s]
+    to_water: float = 1.0 / 225.0  # [1/s] 1/300 under both sides, a quarter of the whole under one alone (K)
     to_other: float = 1.0 / 10000.0  # [1/s] to snow, ice, gravel: in doubt a warning does less harm than none
+    to_side: float = 1.0 / 900.0  # the same under one side alone: as often as water there (K)
     to_dry: float = 1.0 / 10.0
     mistaken: float = 1.0 / 100.0  # of water to another surface and back
     among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
-    start: tuple[float, float, float] = (0.96, 0.02, 0.02)  # dry, wet, other; with 0.15 trailers were rain
+    start: tuple[float, float, float, float] = (0.955, 0.02, 0.02, 0.005)  # of roads; with 0.15 wet trailers were rain
     drags: float = 0.05  # [m/s^2] that water near full aquaplaning takes at least
     shakes: float = 2.0  # [-] log variance that it adds where it takes less
     both: float = 1.0  # [-] slip of the side that deviates less, where it does neither
@@ -81,7 +85,7 @@ class FilterParams(NamedTuple):
 
 class Inputs(NamedTuple):
     """Arrays (n,): speed [m/s]; acceleration that the torques make on a level dry road and resistance [m/s²]; of sides
-    slip front less rear; traction. [-]
+    slip front less rear; traction [-]; specific force along the car [m/s²].
 
     NaN where a value is unknown or not to be trusted.
     """
@@ -95,6 +99,7 @@ class Inputs(NamedTuple):
     u_fr: FloatArray
     u_rl: FloatArray
     u_rr: FloatArray
+    a_x: FloatArray
 
 
 class Emissions(NamedTuple):
@@ -102,7 +107,8 @@ class Emissions(NamedTuple):
     distance, by laws of lost contact with shares `law` (laws,): each of front wheels that slip ahead, then of others.
 
     `contact` (laws, nodes) [-] of the front axle; `ways` (laws, nodes) log share of those wheels; `prior` (full
-    speeds,). `kind_` the same of kinds of road: `road` 0 dry, 1 wet, 2 snow, ice or gravel, whose shares sum to 1.
+    speeds,). `kind_` the same of kinds of road: `road` 0 dry, 1 wet, 2 snow, ice or gravel, 3 these under
+    one side alone; shares of each sum to 1.
     """
 
     mean: FloatArray
@@ -126,8 +132,8 @@ class Emissions(NamedTuple):
 class Filter(NamedTuple):
     """State: evidence on the full speeds, what a dry road shows, and the steps of the window.
 
-    `R` (5,): offset of the resistance [m/s²], its share of what the torques make (an unknown load or trailer), and
-    their covariance.
+    `R` (4, 3): offset of the resistance [m/s²], its share of what the torques make (an unknown load or trailer), what
+    the air adds at `pace` [m/s²], and their covariance.
     `sides` (2, 7): offset of the slip, share of the axles' slips that it is off by, covariance, log variance and its
     variance.
     """
@@ -136,9 +142,10 @@ class Filter(NamedTuple):
     kinds: FloatArray  # (kinds,) probabilities of kinds of road
     R: FloatArray
     sides: FloatArray
+    body: FloatArray  # (3,) log variance of the specific force within a step, its variance, and the window's beyond it
     window: FloatArray  # (ROWS, COLUMNS)
-    sums: FloatArray  # (3, 9) sums, counts and sums of squares of the running step
-    samples: FloatArray  # (2,) of the running step; steps so far
+    sums: FloatArray  # (3, inputs) sums, counts and sums of squares of the running step
+    samples: FloatArray  # (3,) of the running step; steps so far; variance of their resistance [(m/s²)²]
     x: FloatArray  # (2, features) of the last window, and variances of what they are compared with
     out: FloatArray  # (len(OUTPUTS),)
 
@@ -149,11 +156,12 @@ class Filter(NamedTuple):
         return Filter(
             evidence=np.zeros((t.law.size, FULL_SPEEDS.size)),
             kinds=t.kind_prior * np.array(p.start)[t.road.astype(int)],
-            R=np.array([0.0, 0.0, p.offset_R**2, 0.0, p.share_a**2]),
+            R=np.vstack([np.zeros(3), np.diag([p.offset_R**2, p.share_a**2, p.area**2])]),
             sides=np.stack([side, side]),
+            body=np.array([p.shock, p.offset_M**2, 0.0]),
             window=np.full((ROWS, COLUMNS), np.nan),
-            sums=np.zeros((3, 9)),
-            samples=np.zeros(2),
+            sums=np.zeros((3, len(Inputs._fields))),
+            samples=np.zeros(3),
             x=np.full((2, len(FEATURES)), np.nan),
             out=np.full(len(OUTPUTS), np.nan),
         )
