@@ -124,7 +124,8 @@ class JointCriteriaWatch:
         self._other = other_surface.OtherParams.make(setup.dt)
         self._surface = other_surface.initial_state()
         self._free: dict[tuple[str, str], tuple[bool, bool]] = {}
-        self._open = self._hold = self._recent = self._round = self._rows = 0
+        self._open = self._hold = self._recent = self._round = self._rows = self._dry = 0
+        self._known = False
         self._stopped = dict.fromkeys(WHEELS, 0)
 
     def push(self, scene: Scene) -> Output:
@@ -200,7 +201,7 @@ class JointCriteriaWatch:
         there or later. (n,)
 
         At first what this car shows on dry road is not known yet: only slips, shake and resistance together show water.
-        Gravel shakes both axles. Later the margin has to warn behind the gate.
+        Gravel shakes both axles. Once the road was dry for 3 s the margin has to warn behind the gate.
         """
         f, none, first = scene.f, np.full(scene.size, np.nan), self._rows
         self._rows += scene.size
@@ -211,10 +212,13 @@ class JointCriteriaWatch:
             for pair in SIDES.values():
                 front, rear = (f.get(f"variance_{w}", none) for w in pair)
                 alone |= np.minimum(front, rear) < (1.0 - ALONE) * np.maximum(front, rear)
-        is_new = np.arange(first, self._rows) * self._dt < BEGIN
-        warns = [gate & t.active & (t.statistic > SURELY) for t in scene.of(MARGIN)]
-        begins = lost & alone & is_new
-        return begins, begins | (lost & ~is_new & np.any([np.zeros(scene.size, dtype=bool), *warns], axis=0))
+            is_dry = f.get("water_probability", none) < PROBABLE
+        begins = lost & alone & (np.arange(first, self._rows) * self._dt < BEGIN)
+        dry, self._dry = lasting(is_dry, self._dry, least=max(2, round(BEGIN / self._dt)))
+        known = np.logical_or.accumulate(dry) | self._known
+        self._known = bool(known[-1])
+        warns = [gate & known & t.active & (t.statistic > SURELY) for t in scene.of(MARGIN)]
+        return begins, begins | (lost & np.any([np.zeros(scene.size, dtype=bool), *warns], axis=0))
 
     def _began_free(self, track: Track, scene: Scene, rotates: BoolArray) -> BoolArray:
         if track.detector not in _OF_WHEELS or track.wheel is None:

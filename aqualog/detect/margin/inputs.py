@@ -62,7 +62,8 @@ class Reader:
                 small = np.maximum(np.abs(u[i]), np.abs(u[2 + i])) < U_MAX
             sides.append(np.where(trusted & small, slip, np.nan))
         # of the torques, not the accelerometer: that is in the resistance too, and its noise would make a slope of them
-        return Inputs(v, f["delta_a_x"] + scene.columns["a_x"], R, *sides, *u, a_x=scene.columns["a_x"])
+        torques = f["delta_a_x"] + scene.columns["a_x"]
+        return Inputs._make((v, torques, R, *sides, *u, scene.columns["a_x"]))
 
     def _turning(self, scene: Scene, wheel: str) -> FloatArray | None:
         """Speed of a wheel on the centre line, NaN where its signal stands still. [m/s]"""
