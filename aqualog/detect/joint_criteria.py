@@ -41,7 +41,6 @@ A_STOPPED = -3.0  # [m/s^2] the water takes the brakes' force from the car too
 V_STOPPED = 17.0  # [m/s] slower, no film of road water carries a wheel: `other_surface`
 BEGIN = 3.0  # [s] of a log in which no minor spin-down begins, and an offset may have been learnt in water
 CONTACT_PARTIAL = 0.7  # [-] thesis 2.2
-SURELY = 0.5  # [-] probability that full aquaplaning is less than 30 km/h away: thrice the odds of a warning
 _NUMBERED = {1: SPIN_DOWN, 2: MINOR_SPIN_DOWN, 3: SPIN_UP, 4: SLIP_SLOPE_DROP, 5: RESISTANCE}
 CRITERIA = {d.name: number for number, d in _NUMBERED.items()}
 SLOPE = 4
@@ -124,8 +123,7 @@ class JointCriteriaWatch:
         self._other = other_surface.OtherParams.make(setup.dt)
         self._surface = other_surface.initial_state()
         self._free: dict[tuple[str, str], tuple[bool, bool]] = {}
-        self._open = self._hold = self._recent = self._round = self._rows = self._dry = 0
-        self._known = False
+        self._open = self._hold = self._recent = self._round = self._rows = 0
         self._stopped = dict.fromkeys(WHEELS, 0)
 
     def push(self, scene: Scene) -> Output:
@@ -145,8 +143,8 @@ class JointCriteriaWatch:
         )
         bits, stopped = found.behind(gate, slope), self._stopped_by_water(scene)
         bits[1] |= stopped
-        begins, early = self._lost_in_water(scene, gate)
-        sure = stopped | begins
+        early = self._begins_in_water(scene)
+        sure = stopped | early
         recent, self._recent = hold_on(sure, self._recent, seconds=HOLD, dt=self._dt)
         count = np.sum([early, *(bits[k] for k in GATED)], axis=0, dtype=np.float64)
         warned: BoolArray = np.asarray((count > 0) & (sure | ~np.isnan(x)))
@@ -196,29 +194,22 @@ class JointCriteriaWatch:
             stopped |= bits
         return stopped
 
-    def _lost_in_water(self, scene: Scene, gate: BoolArray) -> tuple[BoolArray, BoolArray]:
-        """Where by the margin the front axle has probably lost three tenths of its contact: where a log begins so, and
-        there or later. (n,)
+    def _begins_in_water(self, scene: Scene) -> BoolArray:
+        """Where a log begins on water, and the front axle has probably lost three tenths of its contact (n,).
 
-        At first what this car shows on dry road is not known yet: only slips, shake and resistance together show water.
-        Gravel shakes both axles. Once the road was dry for 3 s the margin has to warn behind the gate.
+        What this car shows on dry road is not known yet: only slips, shake and resistance together show water. Gravel
+        shakes both axles.
         """
         f, none, first = scene.f, np.full(scene.size, np.nan), self._rows
         self._rows += scene.size
         with np.errstate(invalid="ignore"):
             lost = f.get("contact_expected", none) < CONTACT_PARTIAL
-            lost &= (f.get("water_probability", none) > PROBABLE) & (f["v_x_hat"] > V_STOPPED) & ~scene.is_braking
+            lost &= (f.get("water_probability", none) > PROBABLE) & (f["v_x_hat"] > V_STOPPED)
             alone = np.zeros(scene.size, dtype=bool)
             for pair in SIDES.values():
                 front, rear = (f.get(f"variance_{w}", none) for w in pair)
                 alone |= np.minimum(front, rear) < (1.0 - ALONE) * np.maximum(front, rear)
-            is_dry = f.get("water_probability", none) < PROBABLE
-        begins = lost & alone & (np.arange(first, self._rows) * self._dt < BEGIN)
-        dry, self._dry = lasting(is_dry, self._dry, least=max(2, round(BEGIN / self._dt)))
-        known = np.logical_or.accumulate(dry) | self._known
-        self._known = bool(known[-1])
-        warns = [gate & known & t.active & (t.statistic > SURELY) for t in scene.of(MARGIN)]
-        return begins, begins | (lost & np.any([np.zeros(scene.size, dtype=bool), *warns], axis=0))
+        return np.asarray(lost & alone & (np.arange(first, self._rows) * self._dt < BEGIN) & ~scene.is_braking)
 
     def _began_free(self, track: Track, scene: Scene, rotates: BoolArray) -> BoolArray:
         if track.detector not in _OF_WHEELS or track.wheel is None:
