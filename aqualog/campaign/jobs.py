@@ -18,7 +18,7 @@ __all__ = ["Configured", "Job", "code_stamp", "name_of", "plan_jobs", "result_ke
 
 _BEHIND = (
     "core", "physics", "guard", "io", "align", "features", "calibrate", "detect", "checks", "campaign/full_rate.py",
-    "campaign/measure.py",
+    "campaign/measure.py", "evaluate/labels.py",
 )  # fmt: skip
 """Sources behind a result."""
 

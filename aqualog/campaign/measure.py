@@ -29,6 +29,7 @@ from aqualog.detect.slip_slope.direct_inputs import (
     torque_traction,
 )
 from aqualog.detect.stream import ROWS, Settings, detect_drive
+from aqualog.evaluate.labels import joined, spans_of
 from aqualog.physics.differential import differential_slip
 from aqualog.physics.slip import wheel_slip
 
@@ -118,6 +119,7 @@ def _measured(result: DriveResult, vehicle: Vehicle, thinning: Thinning, full: F
         "traction": thinning.traction,
         "v_min": _plain(moving.min()),
         "v_max": _plain(moving.max()),
+        "wet_s": _wet(samples),
         "distance_m": _plain(float(np.sum(moving.to_numpy(), dtype=np.float64)) * thinning.step_s),
         **result.judgement.document(),
         "events": [_event(e) for e in result.events],
@@ -135,6 +137,16 @@ def _measured(result: DriveResult, vehicle: Vehicle, thinning: Thinning, full: F
         "checks": [_remark(r) for r in result.checks],
     }
     return Measurement(samples, about, full.finish(result.judgement))
+
+
+def _wet(samples: pl.DataFrame) -> list[list[float]] | None:
+    """Stretches on water by the log's `on_water` [s]; None without such a signal."""
+    if "on_water" not in samples.columns:
+        return None
+    wet = samples["on_water"].fill_null(0.0).to_numpy() > 0.5
+    t = samples["t"].to_numpy()
+    half = 0.5 * (t[1] - t[0]) if t.size > 1 else 0.0
+    return [[_plain(x) for x in s] for s in joined(spans_of(t - half, wet), 0.5)]
 
 
 def _remark(r: Remark) -> dict[str, Any]:

@@ -19,12 +19,13 @@ from aqualog.core.errors import AqualogError
 from aqualog.core.judgement import Judgement
 from aqualog.core.records import BoolArray, FloatArray, Remark
 from aqualog.core.vehicle import Vehicle
-from aqualog.evaluate.labels import AQUAPLANING, Label, Span
+from aqualog.evaluate.labels import AQUAPLANING, Label, Span, disputed, without
 from aqualog.io.fingerprint import Contents
 
 __all__ = ["SETTLING_S", "CampaignData", "RunInfo", "RunSamples", "load_results"]
 
 SETTLING_S = 0.3  # [s] after entry and before exit; wheels and centred means need it
+_TRY = "Try: the lane times of this log, or none: then its on_water counts"
 _KEPT = 64  # runs whose samples stay in memory
 
 
@@ -35,7 +36,7 @@ class RunInfo:
     `state` is `done`, `failed` or `to do`; `vehicle` has the run's load; `about` holds the findings of `measure`, empty
     unless done; `water_from` gives the source of the lane: `lane times`, `signal`, `labels`, `dry run`, or empty.
     `lanes` are those of all runs on its log, in order: what is found there belongs to the lanes that it touches, else
-    to the nearest one.
+    to the nearest one. `dispute`: how its lane differs from the log's own `on_water`.
     """
 
     index: int
@@ -48,6 +49,7 @@ class RunInfo:
     about: Mapping[str, Any]
     water_from: str
     lanes: tuple[Span, ...] = ()
+    dispute: str = ""
 
     @property
     def is_done(self) -> bool:
@@ -199,13 +201,25 @@ def load_results(
         elif job.key in failed:
             state, reason = "failed", store.failure(job.key)
         name = name_of(configured.campaign, run.logs)
-        water = _water_from(run, about)
-        runs.append(RunInfo(index, name, run, job.key, state, reason, job.vehicle, about, water, lanes[job.key]))
+        water, dispute, is_most = _water_from(run, about), *_dispute(run, about, lanes[job.key])
+        if is_most:
+            state, about, dispute, reason = "failed", {}, "", f"{dispute}. {_TRY}"
+        runs.append(
+            RunInfo(index, name, run, job.key, state, reason, job.vehicle, about, water, lanes[job.key], dispute)
+        )
     return CampaignData(configured, store, runs)
 
 
 def _number(x: float | None) -> float:
     return math.nan if x is None else float(x)
+
+
+def _dispute(run: Run, about: Mapping[str, Any], lanes: tuple[Span, ...]) -> tuple[str, bool]:
+    """As `disputed`; a store of an older version does not know the water."""
+    if run.lane is None:
+        return "", False
+    wet = [(float(a), float(b)) for a, b in about.get("wet_s") or ()]
+    return disputed(run.lane, without(wet, [x for x in lanes if x != run.lane]), is_dry=_is_dry(run))
 
 
 def _water_from(run: Run, about: Mapping[str, Any]) -> str:
@@ -229,6 +243,8 @@ def _on_water(info: RunInfo, frame: pl.DataFrame, t: FloatArray, labels: tuple[L
         others = ~(_inside([lane for lane in info.lanes if lane != info.run.lane], t) == 0.0)
         # a stretch of dry road may be timed as a lane, too
         inside = _inside([info.run.lane], t) * float(not _is_dry(info.run))
+        if "on_water" in frame.columns:  # water beside the lane is no dry road
+            others |= (frame["on_water"].fill_null(0.0).to_numpy() > 0.0) & (inside == 0.0)
         return np.where(others, np.nan, inside)
     if info.water_from == "labels" and labels is not None:
         return _inside([(x.start_s, x.end_s) for x in labels if x.effect in AQUAPLANING], t)

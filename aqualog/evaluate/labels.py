@@ -12,8 +12,8 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.registry import all_of
 
 __all__ = [
-    "AQUAPLANING", "CONTACT_FULL", "CONTACT_PARTIAL", "EFFECTS", "SURFACES", "TRUTH_STEMS", "WATER_AFTER_S",
-    "Label", "Labels", "Span", "after", "joined", "overlaps", "spans_of", "truth_labels", "until", "without",
+    "AQUAPLANING", "CONTACT_FULL", "CONTACT_PARTIAL", "EFFECTS", "SURFACES", "TRUTH_STEMS", "WATER_AFTER_S", "Label",
+    "Labels", "Span", "after", "disputed", "joined", "overlaps", "spans_of", "truth_labels", "until", "without",
 ]  # fmt: skip
 
 Span = tuple[float, float]
@@ -26,6 +26,7 @@ SURFACES = (
     "gear_shift",
 )  # fmt: skip
 
+LANE_SLACK_S = 0.3  # [s] by which a light barrier and a road sensor may differ: wheels settle for as long
 CAR_GAP_S = 1.0  # [s] episodes of the car that are nearer than this are one
 WATER_AFTER_S = 1.0  # [s] what water has set off may still come to light this long after it
 
@@ -111,6 +112,31 @@ def joined(spans: Iterable[Span], gap: float) -> list[Span]:
         else:
             out.append((start, end))
     return out
+
+
+def disputed(lane: Span, wet: Sequence[Span], *, is_dry: bool = False) -> tuple[str, bool]:
+    """Return how the lane of a campaign differs from the water in its log, and whether they share less than a half.
+
+    Parameters
+    ----------
+    lane : (float, float)
+        [s] `is_dry`: by the campaign it is dry.
+    wet : sequence of (float, float)
+        Water in the log, without that of other lanes; sorted and disjoint. [s]
+
+    What is shared is time in both over time in either, of the water that touches the lane. Ends that differ by less
+    than `LANE_SLACK_S` are the same.
+    """
+    near = [s for s in wet if overlaps(s, [lane])] or list(wet)
+    first, last = (near[0][0], near[-1][1]) if near else lane
+    inside = sum(max(min(b, lane[1]) - max(a, lane[0]), 0.0) for a, b in near)
+    apart = inside if is_dry else max(abs(first - lane[0]), abs(last - lane[1]))
+    if apart <= LANE_SLACK_S:
+        return "", False
+    either = sum(b - a for a, b in near) + lane[1] - lane[0] - inside
+    shared = 1.0 - inside / (lane[1] - lane[0]) if is_dry else inside / either
+    what = f"the campaign has {'dry road' if is_dry else 'water'} from {lane[0]:.2f} to {lane[1]:.2f} s"
+    return f"{what}, the log has water from {first:.2f} to {last:.2f} s", shared < 0.5
 
 
 def without(spans: Sequence[Span], holes: Sequence[Span]) -> list[Span]:

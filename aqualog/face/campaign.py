@@ -14,10 +14,12 @@ from aqualog.core.errors import ConfigError
 from aqualog.face.arguments import file_of, number_of, text_of, whole_number
 from aqualog.face.campaign_inputs import CampaignInputs
 from aqualog.face.campaign_runs import CampaignRuns, runs_of
-from aqualog.face.listener import Counted, Progress, listener
+from aqualog.face.listener import Counted, Listener, Progress, listener
 from aqualog.face.result import PathLike
 
 if TYPE_CHECKING:
+    from aqualog.campaign.batch import BatchOutcome
+    from aqualog.campaign.results import CampaignData
     from aqualog.face.inspect import Matrix
     from aqualog.face.plan import BatchPlan
     from aqualog.face.propose import Proposal
@@ -264,7 +266,22 @@ class Campaign(CampaignInputs):
         hear.settled(store.at("manifest.json"))
         hear("loading the results")
         data = load_results(configured, store)
+        outcome = _without_disputed(outcome, data, hear)
         return runs_of(self, data, outcome, part, time.monotonic() - began)
+
+
+def _without_disputed(outcome: BatchOutcome, data: CampaignData, hear: Listener) -> BatchOutcome:
+    """Report runs whose lane differs from their log's own water; those that share less than a half have no result."""
+    lost = {r.name: r.reason for r in data.runs if r.state == "failed" and r.name not in outcome.failed}
+    for name, reason in lost.items():
+        hear.failed(name, reason)
+    told = [f"{r.name}: {r.dispute}" for r in data.done if r.dispute]
+    if told:
+        hear.note(f"lane times beside the on_water of {len(told)} of {len(data.runs)} runs, which count: {told[0]}")
+    gone = len(lost.keys() - {r.name for r in data.done})
+    kept = max(outcome.kept - gone, 0)
+    made = outcome.made - (gone - (outcome.kept - kept))
+    return replace(outcome, made=made, kept=kept, failed={**outcome.failed, **lost})
 
 
 @contextmanager

@@ -18,11 +18,12 @@ from aqualog.campaign.jobs import Configured, name_of
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
+from aqualog.evaluate.labels import disputed
 from aqualog.guard.worker import Crashed, work_on
 from aqualog.trade.braking import Conditions, Stop, stops
 from aqualog.trade.curve import curve_passes
 from aqualog.trade.entry import Kind, Record
-from aqualog.trade.lane import Span, depth_of
+from aqualog.trade.lane import Span, depth_of, spans_of
 from aqualog.trade.limits import Limits
 from aqualog.trade.onset import Onset, onset_of
 from aqualog.trade.straight import straight_runs
@@ -78,6 +79,7 @@ def measure_signals(signals: Signals, vehicle: Vehicle, run: Run | None, request
         )  # fmt: skip
     if run is not None:
         found = tuple(_of_planned_depth(signals, r, run, request.limits.set.depth_share) for r in found)
+        found = tuple(_of_planned_lane(signals, r, lane) for r in found)
     return Measured(found, onset, signals.start_ns, signals.quality.notes)
 
 
@@ -91,6 +93,15 @@ def _of_planned_depth(signals: Signals, record: Record, run: Run, share: float) 
         return record
     what = f"{seen:.1f} mm of water in the log, {planned:.1f} mm in the campaign"
     return replace(record, reasons=(*record.reasons, what))
+
+
+def _of_planned_lane(signals: Signals, record: Record, lane: Span | None) -> Record:
+    """Return a record; it does not count where the log has less than a half of its lane's water, or elsewhere."""
+    what, is_most = disputed(lane, spans_of(signals)) if lane is not None else ("", False)
+    if is_most:
+        why = f"{what}. Try: the lane times of this log, or none"
+        return replace(record, reasons=(*record.reasons, why))
+    return replace(record, notes=(*record.notes, f"{what}: the campaign's counts")) if what else record
 
 
 def measure_logs(

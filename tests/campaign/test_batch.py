@@ -170,6 +170,28 @@ def test_runs_on_one_log_are_one_job(own):
         assert found == {"early": [1, 0], "late": [0, 1], "both": [1, 1]}[owners]
 
 
+def test_lane_times_that_the_log_contradicts(own):
+    head, *rows = (own.parent / "runs.csv").read_text().splitlines()
+    # water is from 1.2 to 3.2 s: before it, a part of it, and dry by its depth
+    rows = [
+        r.replace(*x) for r, x in zip(rows, (("1.2,3.2", "0.1,1.3"), ("1.2,3", "2.0,3"), (",1.3,", ",0,")), strict=True)
+    ]
+    (own.parent / "runs.csv").write_text("\n".join([head, *rows]) + "\n")
+    done = run("batch", own)
+    assert done.exit_code == 3
+    said = " ".join(done.stderr.split())
+    assert "v080_0.parquet: the campaign has water from 0.10 to 1.30 s, the log has water from 1.20 to 3." in said
+    assert "v100_0.parquet: the campaign has dry road from 1.20 to 3.20 s, the log has water from 1.20 to 3." in said
+    assert "Try: the lane times of this log, or none: then its on_water counts" in said
+    assert "note: lane times beside the on_water of 1 of 3 runs, which count: logs/v090_0.parquet: the campaign" in said
+    assert "1 logs done (1 now, 0 before), 2 failed" in done.stdout
+    data = load_results(configure(own), Store(own.with_suffix(".store")))
+    (short,) = data.done
+    s = data.samples(short)
+    assert not (s.on_water[(s.t > 1.3) & (s.t < 3.2)] == 0.0).any()  # water beside the lane is no dry road
+    assert (s.on_water[s.t < 0.9] == 0.0).all()
+
+
 def test_a_damaged_result_is_told(own):
     store = Store(own.parent / "s")
     run_batch(configure(own), store)

@@ -109,6 +109,21 @@ def test_water_of_another_depth_than_planned(told, counts):
     assert counts or run.reasons == ("7.0 mm of water in the log, 4.0 mm in the campaign",)
 
 
+@pytest.mark.parametrize("kind", ["straight", "curve", "braking"])
+def test_lane_times_that_the_log_contradicts(kind):
+    def of(*lane):
+        planned = Run((Path("a.mf4"),), Path("car.toml"), None, lane, {})
+        return measure_signals(
+            made.signals(made.straight()), made.FWD, planned, Request(kind, defaults(), with_onset=False)
+        ).found[0]
+
+    assert not [x for x in (*of(3.2, 14.0).notes, *of(3.2, 14.0).reasons) if "the log has water" in x]
+    said = "the campaign has water from 4.00 to 14.00 s, the log has water from 3.00 to 14.00 s"
+    assert f"{said}: the campaign's counts" in of(4.0, 14.0).notes
+    why = [x for x in of(0.5, 4.0).reasons if "the log has water from 3.00 to 14.00 s. Try: the lane times" in x]
+    assert why
+
+
 def test_runs_beyond_the_lane_count_as_above():
     test = straight(("A", [run(78.0), run(79.0), run(80.0), run(81.0, above=True)]), ("B", [run(90.0, above=True)] * 3))
     a, b = (s.summary for s in test.sets)

@@ -105,6 +105,8 @@ _KINDS: tuple[tuple[str, str, str, _Test], ...] = (
     ("limit", "lane not known", "no lane times, labels, on_water signal or dry run: excluded from figures over speed",
      lambda r: "" if r.water_from else "no lane"),
     ("limit", "lane after the log's end", "used up to the end of the log", _lane_beyond),
+    ("limit", "lane times beside the log's on_water", "the lane times count, and water beside them is no dry road",
+     lambda r: r.dispute),
     ("limit", "vehicle file without the drivetrain", "minor spin-downs, spin-ups, resistance and the joint "
      "detectors are not judged; slip slopes and speeds of full aquaplaning are not estimated", _no_drivetrain),
     ("limit", "slip-slope drop without a dry slope", "a drop is found only relative to the dry slope learnt in the "
