@@ -21,7 +21,7 @@ from aqualog.trade.grip import Coefficients, wet_grip_index
 from aqualog.trade.limits import Limits
 from aqualog.trade.logs import Measured
 from aqualog.trade.sets import Summary, expected_in_set, summarised
-from aqualog.trade.speeds import DELAY_OPEN, RATIO_OF_SET
+from aqualog.trade.speeds import DELAY_OPEN, NO_V_X, RADIUS_OF_SET, RADIUS_OPEN, RATIO_OF_SET
 from aqualog.trade.straight import StraightRun
 
 __all__ = ["ControlRow", "Options", "SetRow", "TradeTest", "check_control", "entries_of", "evaluated"]
@@ -173,20 +173,30 @@ def _is_control(entries: Sequence[Entry], members: Sequence[int], options: Optio
 
 
 def _take_ratio_of_set(entries: list[Entry], members: Sequence[int]) -> None:
-    """Give in place the free wheel's speed to runs that do not show how late v_x is, at its ratio to v_x in their set.
+    """Give in place the free wheel's speed, at its ratio to v_x in their set, to runs that lack v_x or its delay.
 
-    The set's other runs show that ratio without their delays. A bound by a late v_x is too low, so it holds.
+    The set's other runs show that ratio without their delays. A bound by a late v_x is too low, so it holds. A run
+    without v_x does not count if others have it and none shows the ratio; a set without any v_x has one radius.
     """
-    runs = {i: f for i in members if isinstance(f := entries[i].found, StraightRun) and "v_15" in f.speeds_other}
-    runs = {i: f for i, f in runs.items() if math.isfinite(f.speeds_other["v_15"])}
+    runs = {i: f for i in members if isinstance(f := entries[i].found, StraightRun)}
+    seen = [f for f in runs.values() if math.isfinite(f.speeds_other.get("v_15", math.nan))]
     for i, f in runs.items():
-        sure = [g for g in runs.values() if math.isfinite(g.late) and g.other == f.other]
-        if DELAY_OPEN not in f.notes or not sure:
+        lacks = NO_V_X.format(f.reference) in f.notes
+        free = f.reference if lacks else f.other
+        sure = [g.speeds["v_15"] / g.speeds_other["v_15"] for g in seen if math.isfinite(g.late) and g.other == free]
+        if lacks and not sure and any(g.reference == "v_x" for g in runs.values()):
+            entries[i] = replace(entries[i], found=replace(f, reasons=(*f.reasons, RADIUS_OPEN.format(free))))
+        if not sure or not (lacks or (DELAY_OPEN in f.notes and f in seen)):
             continue
-        ratio = float(np.median([g.speeds["v_15"] / g.speeds_other["v_15"] for g in sure]))
-        notes = tuple(RATIO_OF_SET if n == DELAY_OPEN else n for n in f.notes)
-        speeds = {n: v * ratio for n, v in f.speeds_other.items()}
-        own = replace(f, speeds=speeds, speeds_other=f.speeds, reference=f.other, other=f.reference, notes=notes)
+        ratio = float(np.median(sure))
+        old, new = (NO_V_X, RADIUS_OF_SET) if lacks else (DELAY_OPEN, RATIO_OF_SET)
+        notes = tuple(new.format(free) if n == old.format(free) else n for n in f.notes)
+        speeds = {n: v * ratio for n, v in (f.speeds if lacks else f.speeds_other).items()}
+        others, by, other = ({}, free, "") if lacks else (f.speeds, f.other, f.reference)
+        bound = f.v_bound * (ratio if lacks else 1.0)
+        own = replace(
+            f, speeds=speeds, speeds_other=others, reference=by, other=other, notes=notes, v_bound=bound
+        )  # fmt: skip
         entries[i] = replace(entries[i], found=own)
 
 
@@ -197,14 +207,16 @@ def _judge_by_set(entries: list[Entry], members: Sequence[int], limits: Limits) 
         math.nan if not f.valid or isinstance(f, CurvePass) else f.bfc if isinstance(f, Stop) else f.a_x for f in found
     ]
     speeds = [f.v for f in found if isinstance(f, StraightRun)]
+    wet = [f.wet for f in found if isinstance(f, StraightRun)]
     share = limits.straight.a_x_share if speeds else limits.braking.bfc_share
-    expected = expected_in_set(values, speeds or None)
+    expected = expected_in_set(values, speeds or None, wet or None)
     for i, value, own in zip(members, values, expected, strict=True):
         if not abs(value - own) > share * abs(own):
             continue
         far = f"more than {100 * share:g} % from the"
         stop = f"the coefficient is {value:.2f}, {far} set's median of {own:.2f}: did ABS control the brake?"
-        run = f"the acceleration before 15 % is {value:.2f} m/s², {far} {own:.2f} m/s² of its set at this speed"
+        run = f"the acceleration before {limits.straight.level} is {value:.2f} m/s², "
+        run += f"{far} {own:.2f} m/s² of its set at this speed"
         entries[i] = replace(entries[i], of_set=(run if speeds else stop,))
 
 

@@ -47,6 +47,16 @@ class StraightLimits:
     a_x_least: float
     lost: float
 
+    @property
+    def level(self) -> str:
+        """`15 %`: the slip as people say it."""
+        return f"{100.0 * self.slip:g} %"
+
+    @property
+    def speed_name(self) -> str:
+        """`v_15`: name of the speed at that slip."""
+        return f"v_{100.0 * self.slip:02g}"
+
 
 @dataclass(frozen=True, slots=True)
 class CurveLimits:

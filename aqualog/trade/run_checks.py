@@ -32,11 +32,14 @@ class Looked(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """Why a run is not valid, what could not be checked, mean acceleration [m/s²] and largest yaw rate [rad/s]."""
+    """Why a run is not valid, what could not be checked, mean acceleration [m/s²], the share of its time that is on
+    the lane, and largest yaw rate [rad/s].
+    """
 
     reasons: tuple[str, ...]
     notes: tuple[str, ...]
     a_x: float
+    wet: float
     yaw_rate: float
 
 
@@ -50,12 +53,12 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
     until: BoolArray = (t >= run.span[0]) & (t <= t_stop)
     reasons: list[str] = []
     notes: list[str] = []
-    where = "before 15 %" if run.is_crossing else "before the highest speed"
+    where = f"before {limits.level}" if run.is_crossing else "before the highest speed"
     gap = longest_gap(run.slip, until) * dt
     if gap > limits.lost:
         reasons.append(f"wheel speeds are missing for {gap:.2f} s {where}")
     if run.is_crossing and (came := t_stop - run.span[0]) < limits.entry:
-        reasons.append(f"15 % came {max(came, 0.0):.2f} s after the lane began: the car entered it too fast")
+        reasons.append(f"{limits.level} came {max(came, 0.0):.2f} s after the lane began: the car entered it too fast")
     if run.is_crossing and not np.isfinite(run.v[int(run.stop) : int(run.stop) + 2]).all():
         reasons.append("the speed is missing at the crossing")
     begin = max(t_stop - limits.a_x_window, run.span[0] - limits.dry)
@@ -86,7 +89,8 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
     elif fall > limits.torque_cut:
         by = f"by {100 * fall:.0f} %" if fall < 1.0 else "below zero"
         reasons.append(f"the torque falls {by} within a second {where}: it was cut")
-    return Seen(tuple(reasons), tuple(notes), a_x, largest)
+    wet = min((t_stop - run.span[0]) / (t_stop - begin), 1.0) if t_stop > begin else math.nan
+    return Seen(tuple(reasons), tuple(notes), a_x, wet, largest)
 
 
 def longest_gap(x: FloatArray, within: BoolArray) -> int:

@@ -17,6 +17,8 @@ __all__ = ["Summary", "expected_in_set", "summarised"]
 
 _LEAST_FOR_MEDIAN = 3  # runs without which no run can be said to differ from the others
 _FALLS = (-2.0, 0.0)  # exponent of the speed in the acceleration of full throttle
+_FALLS_WET = (-0.5, 0.0)  # its relative change from dry road to water
+_ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,19 +86,32 @@ def summarised(values: Sequence[float], bounds: Sequence[float], runs: int, limi
     return replace(summary, notes=tuple(notes), is_enough=is_enough)
 
 
-def expected_in_set(values: Sequence[float], speeds: Sequence[float] | None = None) -> FloatArray:
+def expected_in_set(
+    values: Sequence[float], speeds: Sequence[float] | None = None, wet: Sequence[float] | None = None
+) -> FloatArray:
     """Return what the runs of a set let expect of each: their median; with less than three NaN, as none can differ.
 
-    With `speeds` the accelerations of full throttle, which fall with the speed v: v^n about the median, n the median
-    slope between two runs. It lies between 0 (constant force) and -2 (constant power, a quarter of its
-    force against resistances), so that neither equal speeds nor one run away from the others can bend it further.
+    With `speeds` and `wet` the accelerations of full throttle. They fall with the speed v, and with the share of their
+    window that is in water, whose drag and lost grip a run that enters slowly has for longer. v^n (1 + c (wet less its
+    median)) about the median, n and c median slopes between two runs, in three rounds. n lies between 0 (constant
+    force) and -2 (constant power, a quarter of its force against resistances), c between 0 and -0.5 (half the force
+    lost in water). So neither equal speeds nor one run away from the others can bend it further.
     """
     x = np.array(values, dtype=np.float64)
     known = np.isfinite(x)
     if known.sum() < _LEAST_FOR_MEDIAN:
         return np.full(x.size, np.nan)
     v = np.ones(x.size) if speeds is None else np.array(speeds) / np.median(np.array(speeds)[known])
-    first, second = np.triu_indices(int(known.sum()), 1)
-    rise, run = (y[known][second] - y[known][first] for y in (x / np.median(x[known]), v))
-    slope = float(np.clip(np.median(rise[run != 0.0] / run[run != 0.0]), *_FALLS)) if (run != 0.0).any() else 0.0
-    return np.asarray(np.median((x / v**slope)[known]) * v**slope, dtype=np.float64)
+    in_water = np.zeros(x.size) if wet is None else np.array(wet) - np.median(np.array(wet)[known])
+    by_speed, by_water = np.ones(x.size), np.ones(x.size)
+    for _ in range(_ROUNDS):
+        by_speed = v ** _median_slope(v[known], (x / by_water)[known], _FALLS)
+        by_water = 1.0 + _median_slope(in_water[known], (x / by_speed)[known], _FALLS_WET) * in_water
+    return np.asarray(np.median((x / (by_speed * by_water))[known]) * by_speed * by_water, dtype=np.float64)
+
+
+def _median_slope(x: FloatArray, y: FloatArray, bounds: tuple[float, float]) -> float:
+    """Return the median slope between two points, y relative to its median, within bounds; 0 where all x are equal."""
+    first, second = np.triu_indices(x.size, 1)
+    run, rise = x[second] - x[first], (y[second] - y[first]) / np.median(y)
+    return float(np.clip(np.median(rise[run != 0.0] / run[run != 0.0]), *bounds)) if (run != 0.0).any() else 0.0

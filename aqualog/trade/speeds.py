@@ -13,7 +13,7 @@ from aqualog.features.smoothing import earlier
 from aqualog.trade.lane import mean_over
 from aqualog.trade.run_checks import longest_gap
 
-__all__ = ["DELAY_OPEN", "RATIO_OF_SET", "Speeds", "lateness", "references"]
+__all__ = ["DELAY_OPEN", "NO_V_X", "RADIUS_OF_SET", "RADIUS_OPEN", "RATIO_OF_SET", "Speeds", "lateness", "references"]
 
 _SHARE = 0.9  # of the lane on which a reference must have a value
 _V_LEAST = 3.0  # [m/s] below, no radius is learnt
@@ -26,6 +26,9 @@ _GAP_S = 0.1  # [s] a longer gap in v_x is remarked
 _LATE_OPEN = 0.03  # [s] a delay that is less sure is not taken off; as `campaign.delay.HALF_MAX`
 _BRAKES = 2e5  # [Pa] of the brakes, which make the free wheel slip
 DELAY_OPEN = "the delay of v_x is not known: too even a speed before and on the lane"
+NO_V_X = "no v_x in the log: the speed is that of the free wheel {}, with the vehicle file's radius"
+RADIUS_OF_SET = "no v_x in the log: the speed is that of the free wheel {}, at its ratio to v_x in the set"
+RADIUS_OPEN = "no v_x in the log, and no other run of its set shows the radius of its free wheel {}"
 RATIO_OF_SET = "the delay of v_x is not known: the speed is the free wheel's, at its ratio to v_x in the set"
 APART = 1.0 / 3.6  # [m/s] references that differ by more are remarked
 
@@ -73,6 +76,7 @@ def references(
     if has_free:
         own = _at_ratio(v_x, by_wheel, _known(signals, on_lane, before), signals.dt)
         what = f"no v_x on the lane: the speed is that of the free wheel {free}"
+        what = what if np.isfinite(v_x).any() else NO_V_X.format(free)
         return Speeds(own, none, (free, ""), (what, *((note,) if note else ())))
     if seen >= _SHARE:
         return Speeds(v_x, none, ("v_x", ""), (note or "no free wheel on the dry side checks v_x",))

@@ -64,6 +64,8 @@ class StraightRun:
         Speed [m/s] and slip [-] on the lane, at most 50 a second.
     late : float
         By how much `v_x` was late, which is taken off. [s] NaN if nothing was.
+    wet : float
+        Share of the acceleration's time on the lane.
     """
 
     speeds: Mapping[str, float] = field(default_factory=dict)
@@ -82,6 +84,7 @@ class StraightRun:
     lane: Span | None = None
     curve: tuple[FloatArray, FloatArray] = field(default=(np.zeros(0), np.zeros(0)), compare=False, repr=False)
     late: float = math.nan
+    wet: float = 1.0
 
     @property
     def is_censored(self) -> bool:
@@ -164,7 +167,7 @@ def straight_run(
     is_reached = math.isfinite(at)
     stop = at if is_reached else float(highest)
     other = crossing(-slip, on_lane & (np.arange(t.size) <= stop), limits.slip / (1.0 + limits.slip), lasts)
-    wrong = f"the other driven wheel, on the {_OTHER[side]}, slipped by {100 * limits.slip:g} %: wrong side declared?"
+    wrong = f"the other driven wheel, on the {_OTHER[side]}, slipped by {limits.level}: wrong side declared?"
     torque = np.asarray(np.sum([signals.array(f"torque_{w}") for w in vehicle.driven], axis=0), dtype=np.float64)
     seen = look(signals, Looked(span, raw, speeds.own, stop, is_reached, torque), limits)
     every = max(1, round(1.0 / (_SHOWN_HZ * dt)))
@@ -174,7 +177,7 @@ def straight_run(
         *speeds.names, math.nan if is_reached else float(speeds.own[highest]),
         (*((wrong,) if math.isfinite(other) else ()), *seen.reasons),
         (*notes, *speeds.notes, *seen.notes), seen.a_x, seen.yaw_rate, ratio, _read(t, at), side, axle, span,
-        (speeds.own[on_lane][::every], slip[on_lane][::every]), speeds.late,
+        (speeds.own[on_lane][::every], slip[on_lane][::every]), speeds.late, seen.wet,
     )  # fmt: skip
 
 

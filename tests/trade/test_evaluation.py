@@ -23,8 +23,8 @@ from aqualog.trade.grip import Coefficients
 from aqualog.trade.limits import Limits, defaults, described
 from aqualog.trade.logs import Measured, Request, measure_signals
 from aqualog.trade.onset import Onset
-from aqualog.trade.speeds import DELAY_OPEN
-from aqualog.trade.straight import StraightRun
+from aqualog.trade.speeds import DELAY_OPEN, NO_V_X
+from aqualog.trade.straight import StraightRun, straight_runs
 from tests.trade import made
 
 KMH = 1.0 / 3.6
@@ -90,6 +90,39 @@ def test_a_run_that_does_not_show_how_late_v_x_is_takes_the_ratio_of_its_set():
     assert (test.entries[3].found.reference, test.entries[3].found.other) == ("omega_rr", "v_x")
     assert "at its ratio to v_x in the set" in test.entries[3].found.notes[0]
     assert test.entries[4].found.notes == (DELAY_OPEN,)
+
+
+def test_a_run_without_v_x_takes_the_ratio_of_its_set():
+    def of(v, by, **more):
+        return replace(run(v), speeds_other={"v_15": by * KMH}, other="omega_rr", **more)
+
+    lacks = replace(run(78.78), reference="omega_rr", notes=(NO_V_X.format("omega_rr"),))
+    above = replace(lacks, speeds={"v_15": math.nan}, v_bound=80.8 * KMH)
+    sure, unsure = of(78.0, 78.78, late=0.1), of(78.0, 78.78, notes=(DELAY_OPEN,))
+    test = straight(("A", [sure, lacks, above]), ("B", [lacks, lacks]), ("C", [unsure, lacks]))
+    assert [e.value for e in test.entries[:5]] == pytest.approx([78.0, 78.0, 80.0, 78.78, 78.78])
+    said = "no v_x in the log: the speed is that of the free wheel omega_rr, "
+    assert test.entries[1].found.notes == (f"{said}at its ratio to v_x in the set",)
+    assert test.entries[3].found.notes == (f"{said}with the vehicle file's radius",)
+    assert [e.valid for e in test.entries] == [True] * 6 + [False]
+    assert test.entries[6].reasons == (
+        "no v_x in the log, and no other run of its set shows the radius of its free wheel omega_rr",
+    )
+
+
+def test_another_slip_has_its_name_in_page_text_and_reasons():
+    limits = Limits.of({"straight.slip": 0.1})
+    test = straight(("A", [run(78.0), run(78.4), run(78.2), run(78.0, a_x=0.8)]), limits=limits)
+    report = trade_report(test)
+    page = report_page(report, title="week")
+    for shown in (report_text(report), page, json.dumps(trade_document(test, "week")["runs"])):
+        assert "15 %" not in shown.replace(described()[0].source, "")
+        assert "the acceleration before 10 % is 0.80" in shown
+    assert "v_10 [km/h]" in page
+    assert "v_15" not in page
+    columns = made.straight(v_15=64.5, slope=0.5)
+    (found,) = straight_runs(made.signals(columns), made.FWD, limits.straight)
+    assert any(r.startswith("10 % came") for r in found.reasons)
 
 
 def test_a_stop_that_abs_did_not_control_does_not_count():

@@ -125,8 +125,8 @@ def test_summary_of_one_run_and_of_none():
     assert summarised([0.7] * 6, [], 6, LIMITS).sd == 0.0  # a mean of equal floats is another float
 
 
-def away(values, speeds=None):
-    expected = expected_in_set(values, speeds)
+def away(values, *of):
+    expected = expected_in_set(values, *of)
     return [bool(abs(x - e) > 0.1 * e) for x, e in zip(values, expected, strict=True)]
 
 
@@ -134,6 +134,14 @@ def test_away_from_the_median():
     assert away([1.3, 1.31, 1.29, 1.6]) == [False, False, False, True]
     assert away([1.3, 1.6]) == [False, False]  # which of two is the odd one?
     assert away([1.3, math.nan, 1.31, 1.0]) == [False, False, False, True]
+
+
+def test_accelerations_are_compared_at_like_share_of_water():
+    v, wet = np.linspace(66.0, 69.0, 7), np.array([0.6, 0.4, 0.7, 0.45, 0.4, 1.0, 0.5])  # the sixth entered slowly
+    full = 1.7 * (67.0 / v) * (1.0 - 0.35 * (wet - 0.4))
+    assert away(full, v)[5]
+    assert not any(away(full, v, wet))
+    assert away(np.where(np.arange(7) == 5, 0.75 * full, full), v, wet) == [False] * 5 + [True, False]
 
 
 def test_accelerations_are_compared_at_like_speed():

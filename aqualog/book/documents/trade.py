@@ -95,7 +95,7 @@ STRAIGHT = _document(
     "straight",
     "Straight aquaplaning: the speed of 15 % slip of every run, mean and index of every set.",
     (
-        _kmh("v_15", "speed of 15 % slip; of a censored run the speed that it is above"),
+        _kmh("v_15", "speed of 15 % slip, or of `straight.slip` in use; of a censored run the speed that it is above"),
         f.flag("censored", "whether 15 % were not reached before the lane's end"),
         *(_kmh(f"v_{n}", f"speed of {int(n)} % slip; null where it was not reached") for n in ("05", "10", "50")),
         *(_kmh(f"v_{n}", f"speed at the first {what} on the lane; null without one") for n, what in SIGNS.items()),

@@ -20,7 +20,7 @@ __all__ = ["trade_figures"]
 
 _CONTROLS = (INK, MUTED)  # the control of one configuration, and of the next
 _MOST_CURVES = 60  # runs whose slip is drawn
-_UNIT = {"straight": "speed of 15 % slip [km/h]", "braking": "braking force coefficient [-]"}
+_UNIT = {"straight": "speed of {level} slip [km/h]", "braking": "braking force coefficient [-]"}
 
 
 def trade_figures(test: TradeTest) -> dict[str, Any]:
@@ -61,7 +61,11 @@ def _order(test: TradeTest) -> dict[str, Any] | None:
     data += _control_lines(test)
     noun = "stop" if test.options.kind == "braking" else "run"
     title = f"{noun}s in their order" + (", and the control" if test.controls else "")
-    return figure(data, title, axis(noun), axis(_UNIT[test.options.kind])) if data else None
+    return (
+        figure(data, title, axis(noun), axis(_UNIT[test.options.kind].format(level=test.options.limits.straight.level)))
+        if data
+        else None
+    )
 
 
 def _control_lines(test: TradeTest) -> list[dict[str, Any]]:

@@ -25,7 +25,7 @@ from aqualog.trade.straight import StraightRun
 __all__ = ["headline", "run_name", "trade_report"]
 
 _TITLES = {
-    "straight": ("straight aquaplaning", "speed at which the wet driven wheel turns 15 % faster than the dry one"),
+    "straight": ("straight aquaplaning", "speed at which the wet driven wheel turns {level} faster than the dry one"),
     "curve": ("curved aquaplaning", "lateral acceleration in a trough on a circle"),
     "braking": ("wet braking", "braking force coefficient (v1² - v2²) / (2 d g)"),
 }
@@ -70,6 +70,7 @@ def trade_report(test: TradeTest) -> Report:
     has_sets = bool(test.valid)
     invalid = [(run_name(e), "; ".join(e.reasons)) for e in test.entries if not e.valid]
     remarks = [(group_text(s.group), note) for s in test.sets if _valid(s) for note in _notes(s)]
+    meaning = meaning.format(level=test.options.limits.straight.level)
     sections = [
         Section("", [Headline(headline(test), [*verdicts, *test.notes])], "verdict", look="verdict open", where="page"),
         Section("", [Headline(headline(test))], where="text"),
@@ -104,6 +105,10 @@ def run_name(e: Entry) -> str:
     return name if e.number == 1 else f"{name} ({e.number})"
 
 
+def _name(test: TradeTest) -> str:
+    return test.options.limits.straight.speed_name
+
+
 def _valid(s: SetRow) -> int:
     return s.curve.valid if s.curve is not None else s.summary.valid if s.summary is not None else 0
 
@@ -124,8 +129,8 @@ def _sets(test: TradeTest) -> Table:
     has_index = bool(test.controls)
     heads: list[str | tuple[str, str]] = ["Set", "Valid"]
     if test.options.kind == "straight":
-        heads += ["v_15 [km/h]", "95 %", "CV [%]", "v_05 [km/h]", ("First minor spin-down [km/h]", "minor [km/h]"),
-                  ("Drop of the slip slope [km/h]", "slope [km/h]")]  # fmt: skip
+        heads += [f"{_name(test)} [km/h]", "95 %", "CV [%]", "v_05 [km/h]"]
+        heads += [("First minor spin-down [km/h]", "minor [km/h]"), ("Drop of the slip slope [km/h]", "slope [km/h]")]
     elif test.options.kind == "braking":
         heads += ["BFC", "95 %", "CV [%]"]
     else:
@@ -177,9 +182,10 @@ def _legend(test: TradeTest) -> str:
     if o.kind == "straight":
         late = [f.late for e in test.entries if isinstance(f := e.found, StraightRun) and math.isfinite(f.late)]
         told = f"v_x is late by {median(late):.2f} s (median of {len(late)} runs): taken off.\n" if late else ""
+        level = o.limits.straight.level
         return told + (
-            "v_05, minor spin-down, slip slope: signs that come before 15 %, means of the runs that show them.\n"
-            "Where runs did not reach 15 %, they count as above their highest speed."
+            f"v_05, minor spin-down, slip slope: signs that come before {level}, means of the runs that show them.\n"
+            f"Where runs did not reach {level}, they count as above their highest speed."
         )
     if o.kind == "braking":
         gate, least = o.limits.braking.cv, o.limits.braking.runs
@@ -209,8 +215,8 @@ def _runs(test: TradeTest) -> Table:
     heads: list[str | tuple[str, str]] = ["Run", "Set", "Counts"]
     if test.options.kind == "straight":
         heads += [
-            "v_15 [km/h]",
-            ("v_15 by the other reference", "other"),
+            f"{_name(test)} [km/h]",
+            (f"{_name(test)} by the other reference", "other"),
             "v_05",
             "v_10",
             "v_50",
