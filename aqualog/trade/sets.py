@@ -16,6 +16,7 @@ from aqualog.trade.limits import SetLimits
 __all__ = ["Summary", "expected_in_set", "summarised"]
 
 _LEAST_FOR_MEDIAN = 3  # runs without which no run can be said to differ from the others
+_LEAST_FOR_WATER = 5  # one odd run is in half of the pairs of four
 _FALLS = (-2.0, 0.0)  # exponent of the speed in the acceleration of full throttle
 _FALLS_WET = (-0.5, 0.0)  # its relative change from dry road to water
 _ROUNDS = 3
@@ -96,13 +97,15 @@ def expected_in_set(
     median)) about the median, n and c median slopes between two runs, in three rounds. n lies between 0 (constant
     force) and -2 (constant power, a quarter of its force against resistances), c between 0 and -0.5 (half the force
     lost in water). So neither equal speeds nor one run away from the others can bend it further.
+    c is 0 with less than five runs.
     """
     x = np.array(values, dtype=np.float64)
     known = np.isfinite(x)
     if known.sum() < _LEAST_FOR_MEDIAN:
         return np.full(x.size, np.nan)
     v = np.ones(x.size) if speeds is None else np.array(speeds) / np.median(np.array(speeds)[known])
-    in_water = np.zeros(x.size) if wet is None else np.array(wet) - np.median(np.array(wet)[known])
+    few = wet is None or known.sum() < _LEAST_FOR_WATER
+    in_water = np.zeros(x.size) if few else np.array(wet) - np.median(np.array(wet)[known])
     by_speed, by_water = np.ones(x.size), np.ones(x.size)
     for _ in range(_ROUNDS):
         by_speed = v ** _median_slope(v[known], (x / by_water)[known], _FALLS)

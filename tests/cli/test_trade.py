@@ -113,7 +113,8 @@ def test_a_log_without_the_v_x_of_the_map_is_measured_by_the_free_wheel(tmp_path
     assert done.exit_code == 0, done.stderr
     (found,) = json.loads(done.stdout)["runs"]
     assert (found["v_15_kmh"], found["reference"]) == (pytest.approx(78.0, abs=0.05), "omega_rr")
-    assert "no v_x on the lane: the speed is that of the free wheel omega_rr" in found["notes"]
+    said = "no v_x in the log: the speed is that of the free wheel omega_rr, with the vehicle file's radius"
+    assert said in found["notes"]
     for needs_it in (("test", "curve"), ("test", "braking"), ("detect",)):
         assert 'v_x: no channel "GNSS_Speed"' in run(*needs_it, *own).stderr
 
