@@ -129,9 +129,9 @@ def judge_stability(
     Returns
     -------
     Stability
-        `drifts` where the interval of the trend does not hold 0 and its middle is beyond 10 %; else `varies` where a
-        segment lies off the median of all by more than 20 % and by twice its own interval; `stable` where the
-        interval of the trend lies within ±20 %; else `cannot tell`.
+        `drifts` where the interval of the trend does not hold 0, its middle is beyond 10 %, and the segments' own lines
+        show the same; else `varies` where a segment lies off the median of all by more than 20 % and by twice its own
+        interval; `stable` where the interval of the trend lies within ±20 %; else `cannot tell`.
     """
     span = float(t[-1] - t[0]) if t.size else 0.0
     nothing = (math.nan, math.nan)
@@ -165,7 +165,8 @@ def percent(change: float) -> str:
 
 def _verdict(change: float, low: float, high: float, span: float, segments: tuple[Segment, ...]) -> tuple[Verdict, str]:
     bounds = f"{percent(change)} over {span / 60.0:.1f} min (95 %: {percent(low)} ... {percent(high)})"
-    if (low > 0.0 or high < 0.0) and abs(change) > LEAST:
+    is_drift = (low > 0.0 or high < 0.0) and abs(change) > LEAST
+    if is_drift and _is_seen(segments, is_rise=change > 0.0):
         return "drifts", f"drifts: {bounds}"
     usual = float(np.nanmedian([s.line.k for s in segments]))
     odd = [s for s in segments if _lies_off(s.line, usual)]
@@ -175,7 +176,19 @@ def _verdict(change: float, low: float, high: float, span: float, segments: tupl
         return "varies", f"varies: {1.0 / s.line.k:.1f} from {part}, usually {1.0 / usual:.1f}"
     if low > -SAME and high < SAME:
         return "stable", f"stable: {bounds}"
-    return "cannot tell", f"cannot be determined: {bounds}"
+    return "cannot tell", f"cannot be determined: {bounds}{', which the parts do not show' if is_drift else ''}"
+
+
+def _is_seen(segments: tuple[Segment, ...], *, is_rise: bool) -> bool:
+    """Return whether the lines of the parts, which the reader sees, have such a trend: its interval excludes 0."""
+    ends = np.array([(s.start_s, s.end_s, s.line.k, *s.line.k_ci) for s in segments if s.line.told])
+    if len(ends) < 2:
+        return False
+    weight = 4.0 / (ends[:, 4] - ends[:, 3]) ** 2
+    away = ends[:, :2].mean(axis=1)
+    away = away - np.average(away, weights=weight)
+    fall = float(weight * away @ ends[:, 2] / np.sqrt(weight @ away**2))  # of the slope, in half widths
+    return (-fall if is_rise else fall) > 1.0
 
 
 def _lies_off(line: Line, usual: float) -> bool:

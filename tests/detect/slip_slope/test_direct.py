@@ -169,6 +169,21 @@ def test_constant_slope_is_stable_and_a_falling_one_drifts():
     assert v.per_hour == pytest.approx((1.0 + v.change) ** (3600.0 / v.span_s) - 1.0)
 
 
+def test_equal_parts_are_no_drift():
+    t, mu, slip, is_used = samples(5, seconds=150.0)
+    t, mu, slip = t[is_used], mu[is_used], slip[is_used]
+    label = block_labels(t)
+    for half in (label < (label[-1] + 1) / 2, label >= (label[-1] + 1) / 2):  # softer within each, and equal
+        slip[half] += mu[half] / C * np.linspace(-0.35, 0.35, half.sum())
+        slip[half] += mu[half] * (1.0 / C - fit_line(mu[half], slip[half], label[half]).k)
+    line, segments = fit_line(mu, slip, label), make_segments(t, mu, slip, label, dt=0.1, noise=0.0)
+    assert [s.line.slope for s in segments] == pytest.approx([C] * 2, rel=0.01)
+    found = judge_stability(t, mu, slip, label, whole=line, segments=segments, noise=0.0)
+    assert found.change_ci[1] < 0.0
+    assert found.verdict == "cannot tell"
+    assert found.sentence.endswith("), which the parts do not show")
+
+
 def test_one_soft_part_is_named():
     t, mu, slip, is_used = samples(5, seconds=900.0)
     soft = (t > 300.0) & (t < 620.0)
