@@ -12,7 +12,7 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import Vehicle
 from aqualog.face.arguments import number_of, text_of
 from aqualog.face.drive import Drive, sources_of, vehicle_needed
-from aqualog.face.drives import DrivesLike, drives_of, load_drives, with_own_names
+from aqualog.face.drives import DrivesLike, drives_of, load_drives, repeated_of, with_own_names
 from aqualog.face.listener import Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, bars, flat, rows_table, text_file
 
@@ -197,7 +197,8 @@ def calibrate(
         check_known(fixed)
     else:
         check_fixed(fixed)
-    (all_drives,) = with_own_names(drives_of(drives))
+    named = drives_of(drives)
+    (all_drives,) = with_own_names(named)
     car = vehicle_needed(vehicle, all_drives[0] if all_drives else None)
     loaded = load_drives(all_drives, car, hear)
     hear("estimating")
@@ -214,7 +215,7 @@ def calibrate(
 
     # mass and torque gain are what is estimated
     checks = look_at_all(loaded.signals, car, but=("torque", "resistance"))
-    used, notes = tuple(loaded.used), (*loaded.notes, *loaded.changes, *sentences(checks))
+    used, notes = tuple(loaded.used), (*repeated_of(named), *loaded.notes, *loaded.changes, *sentences(checks))
     return Calibration(
         used, car, found, notes, checks, notes=(*notes, *found.notes),
         has_loss=loaded.has_loss or bool(loaded.changes) or (not wet and len(found.drives) < len(used)),

@@ -17,7 +17,7 @@ from aqualog.face.campaign_inputs import is_campaign
 from aqualog.face.campaign_runs import CampaignRuns
 from aqualog.face.detect import model_of
 from aqualog.face.drive import Drive, sources_of, vehicle_needed
-from aqualog.face.drives import DrivesLike, Grouped, NothingUsableError, drives_of, load_drives, with_own_names
+from aqualog.face.drives import DrivesLike, NothingUsableError, drives_of, load_drives, repeated_of, with_own_names
 from aqualog.face.listener import Listener, Progress, lasting, listener
 from aqualog.face.result import PathLike, Result, Writers, document_head, flat, page_file, table, text_file
 
@@ -287,8 +287,7 @@ def diagnose(
 
     checks = look_at_all(loaded.signals, car)
     notes = (*loaded.notes, *loaded.changes, *sentences(checks))
-    if isinstance(named, Grouped) and named.repeated:
-        notes = (f"{named.repeated} of {named.named} logs given more than once: each counts once", *notes)
+    notes = (*repeated_of(named), *notes)
     return Diagnosis(
         found, tuple(str(p) for d in used for p in d.paths), car.name, notes, checks=checks,
         notes=(*notes, *found.notes),

@@ -14,10 +14,11 @@ from aqualog.face.arguments import expand, list_files, names_of
 from aqualog.face.drive import Drive, DriveLike, drive_of
 from aqualog.face.listener import Listener
 from aqualog.face.result import PathLike
-from aqualog.io.fingerprint import state_of
+from aqualog.io.fingerprint import Contents, state_of
 
 __all__ = [
-    "DrivesLike", "Grouped", "Loaded", "NothingUsableError", "drives_of", "grouped", "load_drives", "with_own_names",
+    "DrivesLike", "Grouped", "Loaded", "NothingUsableError", "drives_of", "grouped", "load_drives", "repeated_of",
+    "with_own_names",
 ]  # fmt: skip
 
 DrivesLike = DriveLike | Sequence[DriveLike]
@@ -35,14 +36,20 @@ class NothingUsableError(SignalError):
 
 
 class Grouped(list[Drive]):
-    """Drives of files that were named; `repeated` of the `named` files are there more than once and count once."""
+    """Drives of files that were named; of the `named` files those that are there more than once count once."""
 
     named = 0
 
     @property
-    def repeated(self) -> int:
-        """Files that were named more than once."""
-        return self.named - len({p.resolve() for d in self for p in d.paths})
+    def repeated(self) -> tuple[str, ...]:
+        """A note on files that were named more than once, if there are any."""
+        more = self.named - sum(len(d.paths) for d in self)
+        return (f"{more} of {self.named} logs given more than once: each counts once",) if more else ()
+
+
+def repeated_of(drives: Sequence[Drive]) -> tuple[str, ...]:
+    """A note on logs that were given more than once, if there are any."""
+    return drives.repeated if isinstance(drives, Grouped) else ()
 
 
 class Loaded:
@@ -121,7 +128,7 @@ def grouped(names: Iterable[PathLike], like: Drive | None = None) -> Grouped:
     Parameters
     ----------
     names : iterable of str or Path
-        Files, folders, globs, `@list.txt`; the same file counts once.
+        Files, folders, globs, `@list.txt`; the same content counts once, under any name.
     like : Drive, optional
         How the files are read: signal map, databases, rate, vehicle, cache.
 
@@ -132,18 +139,31 @@ def grouped(names: Iterable[PathLike], like: Drive | None = None) -> Grouped:
     """
     base = like or Drive(())
     drives = Grouped()
-    seen: set[Path] = set()
+    seen: dict[int, list[Path]] = {}
+    contents = Contents()
     for name in map(str, names):
         found = expand([name])
         drives.named += len(found)
-        paths = [p for p in found if p.resolve() not in seen]
-        seen |= {p.resolve() for p in paths}
+        paths = [p for p in found if _is_new(p, seen, contents)]
         own = list_files([name])
         if Path(name).is_dir():
             drives += [_like(base, paths, Path(name).name or name, own)] if paths else []
         else:
             drives += [_like(base, [p], p.name, own) for p in paths]
     return drives
+
+
+def _is_new(path: Path, seen: dict[int, list[Path]], contents: Contents) -> bool:
+    """Whether no file before holds the same; remembers it in `seen`, by size: only equal sizes are read."""
+    try:
+        alike = seen.setdefault(path.stat().st_size, [])
+        known = {p.resolve() for p in alike}
+        if path.resolve() in known or (alike and contents.of(path) in map(contents.of, alike)):
+            return False
+        alike.append(path)
+    except OSError:  # whoever reads it says so
+        pass
+    return True
 
 
 def _like(base: Drive, paths: Sequence[Path], label: str, lists: Sequence[Path]) -> Drive:

@@ -14,7 +14,7 @@ from aqualog.face.arguments import file_of, text_of
 from aqualog.face.detect import model_of
 from aqualog.face.diagnose import Diagnosis, diagnose
 from aqualog.face.drive import sources_of, vehicle_needed
-from aqualog.face.drives import DrivesLike, Grouped, drives_of, load_drives, with_own_names
+from aqualog.face.drives import DrivesLike, drives_of, load_drives, repeated_of, with_own_names
 from aqualog.face.listener import Progress, listener
 from aqualog.face.result import PathLike, Result, Writers, flat, table
 
@@ -165,8 +165,7 @@ def validate(
 
     found = loaded.tried(work, hear)
     notes: Sequence[str] = (*loaded.notes, *loaded.changes, *found.notes)
-    if isinstance(named, Grouped) and named.repeated:
-        notes = (f"{named.repeated} of {named.named} logs given more than once: each counts once", *notes)
+    notes = (*repeated_of(named), *notes)
     cause = None
     if why:
         try:

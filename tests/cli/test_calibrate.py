@@ -57,6 +57,12 @@ def test_a_folder_is_one_drive_and_a_file_counts_once(dry_folder, tmp_path):
     )  # fmt: skip
     assert code == 0, err
     assert [d["name"] for d in json.loads(text)["drives"]] == ["one", "b.parquet"]
+    (tmp_path / "copy.parquet").write_bytes((dry_folder / "b.parquet").read_bytes())  # no second drive
+    code, text, err = run(
+        dry_folder / "b.parquet", tmp_path / "copy.parquet", "--vehicle", dry_folder / "car.toml", "--json"
+    )
+    assert [d["name"] for d in json.loads(text)["drives"]] == ["b.parquet"]
+    assert "note: 1 of 2 logs given more than once: each counts once" in err
 
 
 @pytest.mark.parametrize(

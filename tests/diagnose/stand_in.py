@@ -35,6 +35,7 @@ def write_drives(folder):
         | {f"omega_{w}": [63.0] * n for w in ("fl", "fr", "rl", "rr")}
     )
     for name in "abc":
+        frame = frame.with_columns(a_x=pl.col("a_x") + 1e-6)  # a copy is no drive of its own
         frame.write_parquet(folder / f"{name}.parquet")
     (folder / "car.toml").write_text(vehicle_toml(Vehicle(name="car")), encoding="utf-8")
     (folder / "campaign.toml").write_text(
