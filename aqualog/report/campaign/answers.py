@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from aqualog.campaign.bins import Group
-from aqualog.campaign.full_speed import FullSpeed
+from aqualog.campaign.full_speed import EVENTS, FullSpeed
 from aqualog.campaign.results import CampaignData
 from aqualog.core.judgement import VERDICTS
 from aqualog.report.campaign.findings import Curve, Findings, crossing
@@ -125,7 +125,8 @@ class Summary(NamedTuple):
 def summaries(answers: Sequence[Answer]) -> list[Summary]:
     """Lowest and highest speed over all configurations, by kind; a kind without any value shows dashes."""
     kinds = [
-        *((f"Full aquaplaning, {w}", [(a, a.full[i]) for a in answers]) for i, w in enumerate(_WAY_NAMES)),
+        *((f"Full aquaplaning, {name}: {EVENTS[way][0]}", [(a, a.full[i]) for a in answers])
+          for i, (way, name) in enumerate(zip(WAYS, _WAY_NAMES, strict=True))),
         (f"Resistance reaches {RESISTANCE_LEVEL:g} m/s²", [(a, a.resistance) for a in answers]),
         ("Half of the dry slip slope lost", [(a, a.half) for a in answers]),
     ]  # fmt: skip

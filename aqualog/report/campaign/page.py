@@ -129,7 +129,8 @@ def _made(data: CampaignData, findings: Findings) -> list[str]:
         "Full aquaplaning is estimated in four ways. Slip slope: slope / dry slope = L², with contact share "
         "L = 1 − (v / v_full)ⁿ. Minor spin-downs: speed at which half of the passes have one, plus 20 km/h. "
         "Spin-downs: speed at which half of the passes have one. Intervals: bootstrap over runs. Foretold: mean of "
-        "what the margin expects of each pass, the fastest first, with the interval of one pass.",
+        "what the margin expects of each pass, the fastest first, with the interval of one pass. These are different "
+        "events: on uneven water single wheels stop at lower speeds than an even contact ends.",
         f"Resistance {RESISTANCE_LEVEL:g} m/s² and half of the dry slope: interpolated between bins with an interval. "
         "The interval ends where the ends of the band cross the level. Of several wheels, the lowest speed counts.",
     ]  # fmt: skip
