@@ -44,7 +44,7 @@ def view_data(views: Sequence[ResidualView], explained: Sequence[str] = ()) -> d
     views : sequence of ResidualView
     explained : sequence of str
         Channels whose error the causes reduce, the most reduced first. The page opens with that panel, over the
-        coordinate that matters most to it.
+        coordinate that matters most to all of them.
 
     Returns
     -------
@@ -147,20 +147,34 @@ def _edges(x: FloatArray, *, is_along: bool) -> FloatArray | None:
 
 
 def _start(views: Sequence[ResidualView], explained: Sequence[str]) -> str | None:
-    """Coordinate whose bins differ most, relative to the spread within them, in an explained channel; else time."""
+    """Coordinate whose bins explain most of what the causes take off, mean over the explained channels; else time.
+
+    All panels share it: that of the first channel alone may show nothing in the others. Time and place explain whatever
+    is smooth, so they count half.
+    """
     names = [c for v in views for c in v.coordinates]
-    channel = next((c for c in explained if any(v.channel == c for v in views)), None)
-    own = next((v for v in views if v.channel == channel), None)
-    if own is None:
-        return "t" if "t" in names else next(iter(names), None)
+    own = [next(v for v in views if v.channel == c) for c in explained if any(v.channel == c for v in views)]
     told: dict[str, float] = {}
-    for name, x in own.coordinates.items():
-        edges = _edges(x, is_along=name in _ALONG)
-        if edges is not None:
-            middle, low, high = binned(x, own.before, edges)
-            spread = float(np.nanmean(high - low)) if np.isfinite(high).any() else 0.0
-            told[name] = float(np.nanstd(middle)) / spread if spread > 0.0 else 0.0
-    return max(told, key=lambda name: told[name]) if told else next(iter(own.coordinates), None)
+    for v in own:
+        gained = v.before if v.after is None else v.before - v.after
+        for name, x in v.coordinates.items():
+            told[name] = told.get(name, 0.0) + _share(x, gained, _edges(x, is_along=False)) * (
+                0.5 if name in _ALONG else 1.0
+            )
+    if told:
+        return max(told, key=lambda name: told[name])
+    return "t" if "t" in names else next(iter(names), None)
+
+
+def _share(x: FloatArray, y: FloatArray, edges: FloatArray | None) -> float:
+    """Share of the variance of `y` between bins of `x`: a few samples at the ends do not decide."""
+    if edges is None:
+        return 0.0
+    middle = binned(x, y, edges)[0]
+    rest = y - middle[np.clip(np.searchsorted(edges, x, side="right") - 1, 0, middle.size - 1)]
+    known = np.isfinite(rest)
+    total = float(np.var(y[known])) if known.any() else 0.0
+    return 1.0 - float(np.var(rest[known])) / total if total > 0.0 else 0.0
 
 
 def binned(x: FloatArray, y: FloatArray, edges: FloatArray) -> FloatArray:

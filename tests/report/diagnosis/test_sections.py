@@ -102,6 +102,16 @@ def test_explained_channels_come_first():
     assert view_data(views_of("named"), ["force_balance", "slip_rr"])["views"][0]["title"] == "Force balance [m/s²]"
 
 
+def test_the_page_opens_over_what_explains_most_of_all_channels():
+    force, slip, rod = view("a", "force_balance"), view("a", "slip_rr"), view("a", "slip_rl", gain=0.0)
+    steer = np.sin(force.coordinates["t"])
+    rod.before[:] = rod.after + 9.0 * steer  # the most reduced channel alone depends on the steer angle
+    for v in (force, slip, rod):
+        v.coordinates["steer_angle"] = steer
+    assert view_data([rod], ["slip_rl"])["start"] == "steer_angle"
+    assert view_data([force, slip, rod], ["slip_rl", "force_balance", "slip_rr"])["start"] in ("torque", "a_x")
+
+
 def test_speed_is_in_kmh_and_a_coordinate_without_change_has_no_bins():
     v = view("a", "kinematic")
     v.coordinates["v_x"][:] = 20.0
