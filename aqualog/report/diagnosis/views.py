@@ -167,14 +167,14 @@ def _start(views: Sequence[ResidualView], explained: Sequence[str]) -> str | Non
 
 
 def _share(x: FloatArray, y: FloatArray, edges: FloatArray | None) -> float:
-    """Share of the variance of `y` between bins of `x`: a few samples at the ends do not decide."""
+    """Share of the mean size of `y`, about its median, that bins of `x` explain: no outlier or end of `x` decides."""
     if edges is None:
         return 0.0
     middle = binned(x, y, edges)[0]
     rest = y - middle[np.clip(np.searchsorted(edges, x, side="right") - 1, 0, middle.size - 1)]
     known = np.isfinite(rest)
-    total = float(np.var(y[known])) if known.any() else 0.0
-    return 1.0 - float(np.var(rest[known])) / total if total > 0.0 else 0.0
+    total = float(np.abs(y[known] - np.median(y[known])).sum())
+    return 1.0 - float(np.abs(rest[known]).sum()) / total if total > 0.0 else 0.0
 
 
 def binned(x: FloatArray, y: FloatArray, edges: FloatArray) -> FloatArray:
