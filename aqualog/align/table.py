@@ -92,14 +92,17 @@ def quality_of(cleaned: Sequence[Clean], file_faults: Sequence[FileFaults], note
 
 
 def _reset_notes(by_file: Mapping[str, TimeFaults]) -> list[str]:
-    """Return files whose clock restarts beside others whose clock goes on: only they are moved."""
+    """Return files whose clock restarts; beside others whose clock goes on, only they are moved."""
     went_on = [file for file, faults in by_file.items() if not faults.resets]
+    beside = f", that of {listed(went_on, NAMED)} does not" if went_on else ""
+    doubt = "times and places after it are in doubt by the true pause"
+    if went_on:
+        doubt = "it may be out of step with the other files (`aqualog align` compares them; else cut the file there)"
     return [
-        f"{file}: its clock restarts{faults.place('resets')}, that of {listed(went_on, NAMED)} does not. The part "
-        "after the restart is placed 1 s behind the part before, which assumes a pause of 1 s; it may be out of step "
-        "with the other files (`aqualog align` compares them; else cut the file there)"
+        f"{file}: its clock restarts{faults.place('resets')}{beside}. The part after the restart is placed 1 s behind "
+        f"the part before, which assumes a pause of 1 s; {doubt}"
         for file, faults in by_file.items()
-        if faults.resets and went_on
+        if faults.resets
     ]
 
 
