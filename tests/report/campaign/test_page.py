@@ -21,7 +21,7 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.judgement import Judgement
 from aqualog.io.atomic_write import move_together
 from aqualog.report.campaign import folder as folder_module
-from aqualog.report.campaign.answers import answers_of, verdicts
+from aqualog.report.campaign.answers import NOTHING, Answer, answers_of, summaries, verdicts
 from aqualog.report.campaign.findings import Curve, Point, crossing, find
 from aqualog.report.campaign.folder import MARK, check_folder, page_names, write_report
 from aqualog.report.campaign.labels import file_name, group_text, value_text
@@ -489,3 +489,13 @@ def test_a_lane_behind_the_end_of_its_log_is_a_problem(case):
     found = [p for p in problems_of(data, case.keys) if "after the log's end" in p.title]
     assert found[0].runs == ((info.index, f"lane from {end + 5.0:g} to {end + 8.0:g} s, the log ends at {end:.1f} s"),)
     assert not [p for p in problems_of(case, case.keys) if "after the log's end" in p.title]
+
+
+def test_speeds_of_full_aquaplaning_name_their_event():
+    found = summaries([Answer((), (NOTHING,) * 4, NOTHING, NOTHING)])
+    assert [s.what for s in found[:4]] == [
+        "Full aquaplaning, from the slip slope: even contact ends",
+        "Full aquaplaning, from the minor spin-downs: first loss + 20",
+        "Full aquaplaning, from the spin-downs: half of passes stop a wheel",
+        "Full aquaplaning, foretold: a free wheel stops",
+    ]
