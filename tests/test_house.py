@@ -12,9 +12,9 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 96_730
+MOST_LINES = 96_790
 MOST_FILES = 518
-MOST_TEST_LINES = 70_570
+MOST_TEST_LINES = 70_590
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100

@@ -8,11 +8,16 @@ import numpy as np
 
 from aqualog.core.records import BoolArray, FloatArray
 
-__all__ = ["Follow", "follow"]
+__all__ = ["Follow", "follow", "passed_from"]
 
 OVER_S = 2.0  # [s] of the change that is compared: shorter than hills, longer than delays
 LAG_S = 1.0  # [s]
 LEAST_TIMES = 10  # as many changes side by side
+CORNERS_S: tuple[float, ...] = tuple(
+    np.geomspace(2.0, 30.0, 9).tolist()
+)  # time constants of a high pass that are tried
+EXPLAINED, LEAST_LEFT = 0.75, 0.1  # of what else is left, which is at least as large [m/s^2]
+STEP_S = 0.1
 
 
 class Follow(NamedTuple):
@@ -51,6 +56,44 @@ def follow(a: FloatArray, v: FloatArray, used: BoolArray, dt: float) -> Follow |
         if abs(c) > abs(best.correlation):
             best = Follow(c, c * float(y[g].std() / x[g].std()), lag * dt, motion)
     return best
+
+
+def passed_from(a: FloatArray, v: FloatArray, used: BoolArray, dt: float) -> float | None:
+    """Time constant [s] of a high pass between the car's acceleration and a, None where it explains little.
+
+    An accelerometer whose signal is coupled without its constant part follows fast changes and forgets what lasts.
+    Arrays (n,); dt in s.
+    """
+    seen = follow(a, v, used, dt)
+    if seen is None:
+        return None
+    k = max(1, round(OVER_S / dt)) // 2
+    every = slice(None, None, max(1, round(STEP_S / dt)))
+    whole = np.arange(a.size)
+    a, v = (np.interp(whole, whole[used], x[used]) for x in (a, v))
+    x, y, good = _shifted(np.gradient(_smooth(v, k), dt), _smooth(a, k), used, round(seen.lag_s / dt))
+    x, y, good = x[every], y[every], good[every]
+    left = [_left(x, y, good), *(_left(_without_slow(x, STEP_S / tau), y, good) for tau in CORNERS_S)]
+    best = int(np.argmin(left))
+    if left[0] < LEAST_LEFT**2 or left[best] > (1.0 - EXPLAINED) * left[0]:
+        return None
+    return CORNERS_S[best - 1]
+
+
+def _without_slow(x: FloatArray, share: float) -> FloatArray:
+    """What is beyond an exponential mean that takes in this share of each sample."""
+    out = np.empty_like(x)
+    mean = 0.0
+    for i, now in enumerate(x.tolist()):
+        mean += share * (now - mean)
+        out[i] = now - mean
+    return out
+
+
+def _left(x: FloatArray, y: FloatArray, good: BoolArray) -> float:
+    """Variance of y that a line over x does not explain."""
+    c = np.cov(x[good], y[good])
+    return float(c[1, 1] - c[0, 1] ** 2 / max(c[0, 0], 1e-30))
 
 
 def _smooth(x: FloatArray, k: int) -> FloatArray:

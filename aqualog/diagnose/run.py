@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from aqualog.checks.follows import Follow, follow
+from aqualog.checks.follows import Follow, follow, passed_from
 from aqualog.core.errors import ConfigError, SignalError
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Signals
@@ -400,6 +400,14 @@ def accelerometer_defect(drive: Drive) -> Follow | None:
     return found if wrong else None
 
 
+def _forgets(drive: Drive) -> float | None:
+    """Time constant [s] of the high pass that `a_x` has been through, if it has."""
+    if "a_x" not in drive.columns:
+        return None
+    a, v = drive.columns["a_x"], drive.speed
+    return passed_from(a, v, np.isfinite(a) & np.isfinite(v), drive.dt)
+
+
 def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> str:
     """Why the drives cannot be tested; empty if they can."""
     for d in ready:
@@ -410,6 +418,11 @@ def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> 
             return (
                 f"a_x (channel {channel}) is not the acceleration of the car in {d.name}: the correlation of its "
                 f"changes with those of the speed is {defect.correlation:.2f}, and their ratio is {defect.gain:.2f}"
+            )
+        if (corner := _forgets(d)) is not None:
+            return (
+                f"a_x of {d.name} forgets what lasts: it is the car's acceleration behind a high pass of about "
+                f"{corner:.0f} s, as of a sensor that is coupled without its constant part"
             )
     used = sum(d.used_s for d in ready)
     if used >= LEAST_USED_S:

@@ -300,7 +300,8 @@ _ALL = [
         drive=DriveSearch(places=_PAIR, tolerance_at={"a_y": 0.1}, equals=_LIKE_AN_OFFSET, check=STANDSTILL),
     ),
     Effect(
-        "accelerometer_gain", "accelerometer [-]", "The accelerometer{at} reads {gain:.3f} times the truth.",
+        "accelerometer_gain", "accelerometer [-]",
+        "The accelerometer{at} reads {gain:.3f} times the truth, by its own gain or by the tilt of the body.",
         "1-3 % (K)",
         (Parameter("gain", "-", 1.0, 0.02, 0.5, 1.5, 0.01, "on the true value"),),
         _on_channels(lambda c, v: replace(c, gain=c.gain * v["gain"])), ("a_x", "a_y"), "a_x",
@@ -454,7 +455,7 @@ _ALL = [
     Effect(
         "clock_skew", "clock of a bus [ppm]", "The clock of the signal{at} runs {skew:.0f} ppm off.",
         "quartz 20-100 ppm (K)",
-        (Parameter("skew", "ppm", 0.0, 100.0, -1e5, 1e5, 20.0, "fast positive"),), _clock_skew, _SIGNALS, "v_x",
+        (Parameter("skew", "ppm", 0.0, 100.0, -1e5, 1e5, 100.0, "fast positive"),), _clock_skew, _SIGNALS, "v_x",
         twins=("signal_delay",),
         drive=DriveSearch(places=("v_x", "a_x", "torque_fl"), is_shift=True), belongs="drive",
     ),

@@ -6,8 +6,9 @@ import numpy as np
 import polars as pl
 import pytest
 
+from aqualog.checks.follows import passed_from
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.run import accelerometer_defect
+from aqualog.diagnose.run import accelerometer_defect, diagnose
 from tests.diagnose.test_drive import CAR, changed, plain, signals, term
 
 
@@ -75,3 +76,28 @@ STAIRS = tuple((4.0 * i, 10.0 + 8.0 * (i % 2)) for i in range(23))
 @pytest.mark.parametrize("hidden", [term("road_grade", grade=0.05), term("trailer", mass=700.0)])
 def test_a_grade_or_a_trailer_is_no_defect(hidden):
     assert accelerometer_defect(prepare(signals(hidden, speed=STAIRS), CAR, "a")) is None
+
+
+def forgetting(a, corner_s, dt=0.01):
+    mean, out = 0.0, np.empty_like(a)
+    for i, x in enumerate(a):
+        mean += dt / corner_s * (x - mean)
+        out[i] = x - mean
+    return out
+
+
+def test_an_accelerometer_that_forgets_what_lasts_is_no_accelerometer():
+    """Fast changes are right: the correlation of its changes over 2 s is 0.9 and more."""
+    log = plain()
+    x = forgetting(log.array("a_x"), 6.0)
+    d = diagnose([("a", changed(log, log.frame.with_columns(pl.Series("a_x", x))))], CAR)
+    assert d.verdict == "not_testable"
+    assert "a_x of a forgets what lasts" in d.sentence
+
+
+@pytest.mark.parametrize("change", [lambda a: a, lambda a: 1.1 * a + 0.5, lambda a: np.roll(a, 40)])
+def test_a_true_accelerometer_forgets_nothing(change):
+    log = plain()
+    drive = prepare(changed(log, log.frame.with_columns(pl.Series("a_x", change(log.array("a_x"))))), CAR, "a")
+    used = np.isfinite(drive.speed)
+    assert passed_from(drive.columns["a_x"], drive.speed, used, drive.dt) is None
