@@ -17,8 +17,8 @@ __all__ = ["repeats", "silent"]
 THIRDS = 3
 SEEN = 2.0  # standard deviations at which a third of the drive says something of a value
 # least share of what its values predict that an effect of the wheels must explain in their slip: right names have 0.37
-# to 1.1, wrong ones less than nothing (S)
-BY_WHEELS = 0.25
+# to 1.1, wrong ones at most 0.30, mostly less than nothing (S)
+BY_WHEELS = 1.0 / 3.0
 # what effects show one by one, over what they show together, from which on they cancel: ten right pairs of another
 # simulator had 0.7 to 1.1, a torque gain with a trailer for a slip slope 12 (S)
 CANCELS = 3.0
