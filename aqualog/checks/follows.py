@@ -13,9 +13,8 @@ __all__ = ["Follow", "follow", "passed_from"]
 OVER_S = 2.0  # [s] of the change that is compared: shorter than hills, longer than delays
 LAG_S = 1.0  # [s]
 LEAST_TIMES = 10  # as many changes side by side
-CORNERS_S: tuple[float, ...] = tuple(
-    np.geomspace(2.0, 30.0, 9).tolist()
-)  # time constants of a high pass that are tried
+# time constants of a high pass that are tried
+CORNERS_S: tuple[float, ...] = tuple(np.geomspace(2.0, 30.0, 9).tolist())
 EXPLAINED, LEAST_LEFT = 0.75, 0.1  # of what else is left, which is at least as large [m/s^2]
 STEP_S = 0.1
 
@@ -68,12 +67,12 @@ def passed_from(a: FloatArray, v: FloatArray, used: BoolArray, dt: float) -> flo
     if seen is None:
         return None
     k = max(1, round(OVER_S / dt)) // 2
-    every = slice(None, None, max(1, round(STEP_S / dt)))
+    step = max(1, round(STEP_S / dt))
     whole = np.arange(a.size)
     a, v = (np.interp(whole, whole[used], x[used]) for x in (a, v))
     x, y, good = _shifted(np.gradient(_smooth(v, k), dt), _smooth(a, k), used, round(seen.lag_s / dt))
-    x, y, good = x[every], y[every], good[every]
-    left = [_left(x, y, good), *(_left(_without_slow(x, STEP_S / tau), y, good) for tau in CORNERS_S)]
+    x, y, good = x[::step], y[::step], good[::step]
+    left = [_left(x, y, good), *(_left(_without_slow(x, step * dt / tau), y, good) for tau in CORNERS_S)]
     best = int(np.argmin(left))
     if left[0] < LEAST_LEFT**2 or left[best] > (1.0 - EXPLAINED) * left[0]:
         return None
