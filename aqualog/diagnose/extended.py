@@ -13,7 +13,7 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.model.plant import Plant, build_plant
 from aqualog.model.scenario import Scenario
-from aqualog.model.sensors import ESC, Channel, Sensors
+from aqualog.model.sensors import ESC, Channel, Sensors, of_place
 from aqualog.model.term import Model, Setup, Term
 from aqualog.model.tyre import TYRES
 from aqualog.physics.load import G, wheel_loads
@@ -109,10 +109,9 @@ def _undo_sensors(measured: _Measured, sensors: Sensors) -> None:
     t, columns = measured.t, measured.columns
     for name, c in sensors.channels.items():
         if c != Channel() and name in columns:
-            turned = (
-                c.ahead * np.nan_to_num(columns["yaw_rate"]) ** 2 if c.ahead != 0.0 and "yaw_rate" in columns else 0.0
-            )
-            columns[name] = (columns[name] - c.bias - c.drift * t) / c.gain + turned
+            at_place = c.ahead != 0.0 and "yaw_rate" in columns
+            turned = of_place(name, np.nan_to_num(columns["yaw_rate"]), measured.dt) if at_place else 0.0
+            columns[name] = (columns[name] - c.bias - c.drift * t) / c.gain - c.ahead * turned
     skew = {name: g.skew_ppm for g in sensors.groups for name in g.signals if g.skew_ppm != 0.0}
     late = {name: c.delay_s for name, c in sensors.channels.items() if c.delay_s != 0.0}
     for name in {**skew, **late}.keys() & columns.keys():

@@ -211,10 +211,8 @@ def _simulated(
     moved = recentred(evidence, model)
     if moved != model:
         new = tuple(t for t in moved.terms if t not in model.terms)
-        notes = tuple(
-            f"The vehicle file is not sure of every value. The verdict holds with what fits best: {term_words(t)}."
-            for t in new
-        )
+        fitted = listed([*map(term_words, new)])
+        notes = (f"The vehicle file allows other values. The verdict holds with those that fit best: {fitted}.",)
         model, bare = moved, Model((*bare.terms, *new))
         ready = [led_by(d, model) for d in ready]
         evidence = simulated(ready, asked, model, tell)

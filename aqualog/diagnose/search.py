@@ -249,9 +249,11 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     # one effect that two others imitate: its evidence rests on how well the simulator knows what it does
     near = linear[best] - max(NEAR, 2.0 * STRUCTURE * linear[best])
     chosen += [m for m, e in posterior.sets if len(m) == 1 < len(best) and e > near]
-    # of each effect its nearest rival, too, rather a small set: sets that differ in small members may come first
+    # of each effect its nearest rival, too, rather a small set: sets that differ in small members may come first, and
+    # what stands for a large effect as well may be further behind by straight lines than it is
+    bent = linear[best] - max(NEAR, DOUBT * linear[best])
     for name in dict.fromkeys(arena.name(b) for b in best):
-        others = [(e - 2.0 * STRUCTURE * linear[best] * len(m), m) for m, e in posterior.sets if m and e > near]
+        others = [(e - 2.0 * STRUCTURE * linear[best] * len(m), m) for m, e in posterior.sets if m and e > bent]
         chosen += [m for _, m in sorted(others, reverse=True) if all(arena.name(b) != name for b in m)][:1]
     chosen = [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m]
     measure = metric(arena, posterior.weighings, coarse=COARSE)
@@ -262,8 +264,7 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     def one(members: Members) -> Option | None:
         own = _effects(arena, members)
         found = refit(led, own, _start(arena, posterior, members), measure, model)
-        # a value at a bound that means no effect: a trailer of no mass
-        if found is None or (any(found.bounded) and np.any(np.abs(found.off) < 1e-12)):
+        if found is None:
             return None
         doubted, exact = _evidence(arena, found, own, measure, nothing)
         relief = max(float(np.logaddexp(doubted, exact)) - math.log(2.0) - doubted, 0.0)
@@ -289,6 +290,9 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
             within[m] = tuple(b for b in m if evidence.asked[arena.blocks[b].tag] not in at_bound)
     smaller = [m for m in dict.fromkeys(within.values()) if m and m not in done]
     done |= dict(zip(smaller, beside(one, smaller), strict=True))
+    # a value at a bound that means no effect, a trailer of no mass: the set is that of its other effects
+    done = {m: None if o and o.refit and _without_effect(o.refit) else o for m, o in done.items()}
+    within = {m: kept for m, kept in within.items() if done[m]}
     # water is not linear: without any effect, the simulator may differ from what signatures say of it
     y = measure.rows([residual(d, model)[None] for d in evidence.drives])
     bare = nothing - 0.5 * float(measure.inner(y, y)[0, 0])
@@ -306,6 +310,10 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     out = {m: o for m, o in out.items() if (within.get(m, m) == m if o.refit else not beyond & set(m))}
     none = max(bare, max(o.evidence for o in out.values()) - posterior.most)
     return _levelled(evidence, arena, out | {(): Option((), none)}, within.get(best, best), equal)
+
+
+def _without_effect(refit: Refit) -> bool:
+    return any(refit.bounded) and bool(np.any(np.abs(refit.off) < 1e-12))
 
 
 def _relieved(options: dict[Members, Option]) -> dict[Members, Option]:
@@ -411,9 +419,9 @@ def _twins(evidence: Evidence, own: Sequence[int]) -> list[tuple[int, ...]]:
         for name in evidence.asked[m].effect.twins:
             for i, h in enumerate(evidence.asked):
                 members = tuple(sorted((*own[:k], i, *own[k + 1 :])))
-                at_usual_place = h.effect.name == name and h.where in (None, h.effect.default)
-                at_usual_place &= h.drive == evidence.asked[m].drive
-                if at_usual_place and len(set(members)) == len(members) and compatible(evidence, members):
+                there = h.effect.name == name and h.where in (None, evidence.asked[m].where, h.effect.default)
+                there &= h.drive == evidence.asked[m].drive
+                if there and len(set(members)) == len(members) and compatible(evidence, members):
                     out.append(members)
     return out
 

@@ -110,7 +110,7 @@ def verdict_sentence(
             most = "" if why[0][1] == len(untested or {}) else f"{why[0][1]} of them: "
             few = f"; {len(untested or {})} effects were not tested ({most}{why[0][0]})"
         if moved:
-            few += f". It does with {listed([*map(term_words, moved)])}: the vehicle file is not sure of its own"
+            few += f". For that it takes {listed([*map(term_words, moved)])}, as the vehicle file allows"
         return f"{agrees}{few}."
     if verdict == "named":
         return causes[0].sentence
@@ -123,11 +123,18 @@ def verdict_sentence(
         open_ones = [f"{n} (mean)" if n in sure else n for n, yes in zip(names, is_sure, strict=True) if not yes]
         if sure and open_ones:
             others = listed(open_ones, "or")
+            if len(open_ones) == 1:
+                odds = _odds(causes[is_sure.index(False)].probability)
+                return f"Certain: {listed(sure)}. This {source} leaves open: {others}{odds}."
             return f"Certain: {listed(sure)}. This {source} cannot distinguish the other causes: {others}."
         if len(causes) == 1 and not sure:
-            odds = "" if math.isnan(causes[0].probability) else f" (probability {causes[0].probability:.2f})"
+            odds = _odds(causes[0].probability)
             return f"The car may differ from the model, but this {source} does not make it certain: {names[0]}{odds}."
         return f"The car differs from the model, but this {source} cannot distinguish {listed(names)}."
-    likely = [f" (probability {c.probability:.2f})" if c.probability < SURE else "" for c in causes]
+    likely = [_odds(c.probability) if c.probability < SURE else "" for c in causes]
     known = f" beside {listed([n + o for n, o in zip(names, likely, strict=True)])}" if names else ""
     return f"The car differs from the model{known} in a way that no effect of the library explains{reason}."
+
+
+def _odds(probability: float) -> str:
+    return "" if math.isnan(probability) else f" (probability {probability:.2f})"

@@ -315,12 +315,12 @@ _ALL = [
     ),
     Effect(
         "accelerometer_position", "place of the accelerometer [m]",
-        "The accelerometer sits {ahead:.2f} m ahead of the centre of gravity.",
+        "The accelerometer{at} sits {ahead:.2f} m ahead of the centre of gravity.",
         "on the tunnel -0.3 to +0.5 m, a logger in the boot -2 m (K)",
         (Parameter("ahead", "m", 0.0, 0.7, -5.0, 5.0, 0.3, "ahead of the centre of gravity positive"),),
-        _on_channels(lambda c, v: replace(c, ahead=c.ahead + v["ahead"])), ("a_x",), "a_x",
-        drive=DriveSearch(places=("a_x",), tolerance=0.2),
-        less="The accelerometer sits {ahead:.2f} m behind the centre of gravity.",
+        _on_channels(lambda c, v: replace(c, ahead=c.ahead + v["ahead"])), ("a_x", "a_y"), "a_x",
+        twins=("signal_delay",), drive=DriveSearch(places=_PAIR, tolerance=0.2),
+        less="The accelerometer{at} sits {ahead:.2f} m behind the centre of gravity.",
     ),
     Effect(
         "signal_delay", "delay of a signal [s]", "The signal{at} comes {delay:.3f} s late.", "GNSS up to 0.5 s (V)",

@@ -17,7 +17,7 @@ from aqualog.model.pickup import edge_times, reported_speed, ring_angles, rolled
 
 __all__ = [
     "ESC", "FAULT_KINDS", "IDEAL", "SENSORS", "Channel", "FaultKind", "Group", "Measured", "SensorFault", "Sensors",
-    "Truth", "measure", "with_faults",
+    "Truth", "measure", "of_place", "with_faults",
 ]  # fmt: skip
 
 SNAP = 1e-6  # [grid steps] a time this close to a point of the fine grid is that point
@@ -52,7 +52,8 @@ class Channel:
     the stamp t + latency; `gain_spread`, `offset_spread`, `drift_spread` [1/s]: rms of the random values of a run.
     `gain`, `bias`, `drift` [1/s] and `delay_s` are set, not random: terms of a model act on them. `pitching` [s²]: what
     the rate of `a_x` adds, as an antenna on the roof of a car that pitches has it for the velocity. `ahead` [m]: how
-    far the accelerometer sits ahead of the centre of gravity: its a_x has -ahead r^2 besides, with the yaw rate r.
+    far the accelerometer sits ahead of the centre of gravity: with the yaw rate r its a_x has -ahead r^2 besides, its
+    a_y +ahead dr/dt.
     """
 
     noise: float = 0.0
@@ -204,12 +205,17 @@ def _rolling(truth: Truth, sensors: Sensors, name: str, seed: int) -> FloatArray
     if channel.pitching != 0.0:
         x = x + channel.pitching * np.gradient(_column(truth, "a_x"), _step(truth))
     if channel.ahead != 0.0:
-        x = x - channel.ahead * _column(truth, "yaw_rate") ** 2
+        x = x + channel.ahead * of_place(name, _column(truth, "yaw_rate"), _step(truth))
     amplitude = sensors.tone_ring[_OMEGA[name]] if name in _OMEGA else 0.0
     if amplitude == 0.0:
         return x
     phase = _stream(seed, name, "ring").uniform(0.0, 2.0 * math.pi)
     return x * (1.0 + amplitude * np.sin(_angle(truth, name) + phase))
+
+
+def of_place(name: str, yaw_rate: FloatArray, dt: float) -> FloatArray:
+    """What an accelerometer (`a_x` or `a_y`) one metre ahead of the centre of gravity has besides. (n,) [m/s^2]"""
+    return np.gradient(yaw_rate, dt) if name == "a_y" else -(yaw_rate**2)
 
 
 def _angle(truth: Truth, name: str) -> FloatArray:

@@ -232,6 +232,10 @@ def test_what_is_certain_is_not_called_open():
     causes = [Cause(n, None, {}, (), "") for n in ("payload_mass", "aero_drag", "head_wind")]
     said = verdict_sentence("cannot_tell", causes, level=0.01, certain=frozenset({"payload_mass"}))
     assert said == "Certain: payload mass. This log cannot distinguish the other causes: aero drag or head wind."
+    said = verdict_sentence(
+        "cannot_tell", [replace(causes[1], probability=0.4), causes[0]], level=0.01, certain=frozenset({"payload_mass"})
+    )
+    assert said == "Certain: payload mass. This log leaves open: aero drag (probability 0.40)."
     road, mean = (Cause("road_grade", None, {}, (), "", p) for p in (1.0, 0.5))
     said = verdict_sentence("cannot_tell", [mean, causes[1], road], level=0.01, certain=frozenset({"road_grade"}))
     assert said == "Certain: road grade. This log cannot distinguish the other causes: road grade (mean) or aero drag."

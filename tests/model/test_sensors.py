@@ -115,9 +115,11 @@ def test_an_antenna_moves_with_the_pitching_body():
 
 
 def test_an_accelerometer_ahead_of_the_centre_of_gravity_is_turned_with_the_car():
-    own = drive(a_x=lambda t: 0.0 * t, yaw_rate=lambda t: 0.1 * t)
+    own = drive(a_x=lambda t: 0.0 * t, a_y=lambda t: 0.0 * t, yaw_rate=lambda t: 0.1 * t)
     t, x = seen(own, one("a_x", Channel(ahead=0.5)))["a_x"]
     assert x == pytest.approx(-0.5 * (0.1 * t) ** 2, abs=1e-12)  # towards the middle of the curve, behind it
+    _, y = seen(own, one("a_y", Channel(ahead=0.5)))["a_y"]
+    assert y == pytest.approx(0.05, abs=1e-9)  # to the left, where the car begins to turn left
 
 
 def test_lag_of_a_ramp_and_of_a_step():
