@@ -227,35 +227,8 @@ def _around(arena: Arena, found: Refit, slopes: Sequence[FloatArray], chosen: Se
 
 def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Model) -> list[Option]:
     """The sets of the posterior; those that hold most of it, twins, relations and effects of water are refitted."""
-    linear = dict(posterior.sets)
-    chosen: list[Members] = []
-    total = 0.0
-    for (members, _), q in zip(posterior.sets, posterior.probability.tolist(), strict=True):
-        if total < COVERED and len(chosen) < REFITTED:
-            chosen.append(members)
-        total += q
-    best = posterior.best
-    by_hypothesis = {b.tag: i for i, b in enumerate(arena.blocks)}
-    equal: set[Members] = set()
-
-    def as_blocks(own: Sequence[int]) -> Members:
-        return tuple(sorted(by_hypothesis[h] for h in own)) if all(h in by_hypothesis for h in own) else ()
-
-    of_one = [(i,) for i in of_water(evidence)]
-    chosen += [as_blocks(own) for own in _twins(evidence, _effects(arena, best)) + of_one]
-    for own in imitations(evidence.asked, _effects(arena, best)):
-        if compatible(evidence, own):
-            equal.add(as_blocks(own))
-    # one effect that two others imitate: its evidence rests on how well the simulator knows what it does
-    near = linear[best] - max(NEAR, 2.0 * STRUCTURE * linear[best])
-    chosen += [m for m, e in posterior.sets if len(m) == 1 < len(best) and e > near]
-    # of each effect its nearest rival, too, rather a small set: sets that differ in small members may come first, and
-    # what stands for a large effect as well may be further behind by straight lines than it is
-    bent = linear[best] - max(NEAR, DOUBT * linear[best])
-    for name in dict.fromkeys(arena.name(b) for b in best):
-        others = [(e - 2.0 * STRUCTURE * linear[best] * len(m), m) for m, e in posterior.sets if m and e > bent]
-        chosen += [m for _, m in sorted(others, reverse=True) if all(arena.name(b) != name for b in m)][:1]
-    chosen = [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m]
+    linear, best = dict(posterior.sets), posterior.best
+    chosen, equal = _chosen(evidence, arena, posterior)
     measure = metric(arena, posterior.weighings, coarse=COARSE)
     led = _led(arena, posterior, model)
     y = measure.rows([r[None] for r in evidence.residuals])
@@ -410,6 +383,38 @@ def _doubtful(arena: Arena, found: Refit) -> list[FloatArray]:
             each[i, to] = off[k] * own[k, c]
         out.append(each)
     return out
+
+
+def _chosen(evidence: Evidence, arena: Arena, posterior: Posterior) -> tuple[list[Members], set[Members]]:
+    """The sets that are refitted; those of them that a relation makes equal to the best one."""
+    linear, best = dict(posterior.sets), posterior.best
+    chosen: list[Members] = []
+    total = 0.0
+    for (members, _), q in zip(posterior.sets, posterior.probability.tolist(), strict=True):
+        if total < COVERED and len(chosen) < REFITTED:
+            chosen.append(members)
+        total += q
+    by_hypothesis = {b.tag: i for i, b in enumerate(arena.blocks)}
+    equal: set[Members] = set()
+
+    def as_blocks(own: Sequence[int]) -> Members:
+        return tuple(sorted(by_hypothesis[h] for h in own)) if all(h in by_hypothesis for h in own) else ()
+
+    of_one = [(i,) for i in of_water(evidence)]
+    chosen += [as_blocks(own) for own in _twins(evidence, _effects(arena, best)) + of_one]
+    for own in imitations(evidence.asked, _effects(arena, best)):
+        if compatible(evidence, own):
+            equal.add(as_blocks(own))
+    # one effect that two others imitate: its evidence rests on how well the simulator knows what it does
+    near = linear[best] - max(NEAR, 2.0 * STRUCTURE * linear[best])
+    chosen += [m for m, e in posterior.sets if len(m) == 1 < len(best) and e > near]
+    # of each effect its nearest rival, too, rather a small set: sets that differ in small members may come first, and
+    # what stands for a large effect as well may be further behind by straight lines than it is
+    bent = linear[best] - max(NEAR, DOUBT * linear[best])
+    for name in dict.fromkeys(arena.name(b) for b in best):
+        others = [(e - 2.0 * STRUCTURE * linear[best] * len(m), m) for m, e in posterior.sets if m and e > bent]
+        chosen += [m for _, m in sorted(others, reverse=True) if all(arena.name(b) != name for b in m)][:1]
+    return [m for m in dict.fromkeys([*chosen, *sorted(equal)]) if m], equal
 
 
 def _twins(evidence: Evidence, own: Sequence[int]) -> list[tuple[int, ...]]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aqualog.core.vehicle import KEYS, Vehicle
+from aqualog.diagnose import search
 from aqualog.diagnose.any_effect import gains_of
 from aqualog.diagnose.arena import arena_of
 from aqualog.diagnose.compete import compete
@@ -185,3 +186,28 @@ def test_a_delay_of_all_signals_but_one_is_that_ones():
     assert not compatible(evidence, (0, 1, 2, 3))
     assert compatible(evidence, (0, 1, 4))
     assert not compatible(evidence, (4, 5))
+
+
+def chosen(asked, sets):
+    """The sets, by keys, that are refitted for a posterior with these sets and evidences; the first one is the best."""
+    arena = arena_of(bench_of(np.zeros((2, 300)), waves(300, len(asked)), asked), ())
+    at = {b.key: i for i, b in enumerate(arena.blocks)}
+    members = [(tuple(sorted(at[k] for k in keys.split())), e) for keys, e in sets]
+    posterior = SimpleNamespace(sets=members, best=members[0][0], probability=np.eye(len(sets))[0])
+    return {
+        " ".join(sorted(arena.blocks[i].key for i in m)) for m in search._chosen(arena.evidence, arena, posterior)[0]
+    }
+
+
+@pytest.mark.parametrize(("behind", "is_refitted"), [(40.0, True), (60.0, False)])
+def test_a_rival_of_a_large_effect_may_be_a_twentieth_behind(behind, is_refitted):
+    sets = [("slip_stiffness@r torque_gain", 1000.0), ("cornering_drag slip_stiffness@r", 1000.0 - behind)]
+    assert (sets[1][0] in chosen(ASKED, sets)) == is_refitted
+
+
+def test_the_twin_of_a_signal_is_that_of_the_same_signal():
+    asked = tuple(hypothesis(*x) for x in (("accelerometer_position", "a_y"), ("signal_delay", "a_x"),
+                                           ("signal_delay", "a_y"), ("road_grade",)))  # fmt: skip
+    assert chosen(asked, [("accelerometer_position@a_y road_grade", 9.0)]) == {
+        "accelerometer_position@a_y road_grade", "road_grade signal_delay@a_y",
+    }  # fmt: skip
