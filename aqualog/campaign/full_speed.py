@@ -183,12 +183,14 @@ def fit_contact(v: FloatArray, contact: FloatArray, sigma: FloatArray) -> tuple[
 
 
 def _from_passes(group: Group, members: Sequence[Pass], way: str, rng: np.random.Generator) -> FullSpeed:
-    """(b), (c): speed at which half of the passes have an event of the free wheels."""
+    """(b), (c): speed at which half of the passes have an event of the free wheels, by the speed of their first one."""
     bare = (group, "free", way)
-    v = np.array([p.v_mean for p in members])
-    early = way == "minor_spin_down"
     # a wheel that stops at once has no minor spin-downs, but its speed is above their beginning
-    hit = np.array([any(p.full.values()) or (early and any(p.minor.values())) for p in members])
+    early = way == "minor_spin_down"
+    begun = [[v for of in (p.full, *([p.minor] if early else [])) for own in of.values() for v in own] for p in members]
+    hit = np.array([bool(at) for at in begun])
+    # a pass without one had none up to its fastest speed
+    v = np.array([min(at, default=p.v_held) for at, p in zip(begun, members, strict=True)])
     what = "minor or full spin-downs" if early else "full spin-downs"
     on = f"{int(hit.sum())} of {hit.size} passes with {what}, {3.6 * v.min():.0f} to {3.6 * v.max():.0f} km/h"
     if hit.size < LEAST_PASSES:
@@ -215,8 +217,8 @@ def _from_passes(group: Group, members: Sequence[Pass], way: str, rng: np.random
 def _foretold(group: Group, members: Sequence[Pass]) -> FullSpeed:
     """(d): mean of the speeds that the margin expects; the fastest passes, nearest to it, count most."""
     bare = (group, "free", "margin")
-    m, s, v = np.array([(*p.foretold, p.v_mean) for p in members if math.isfinite(p.foretold[0])]).reshape(-1, 3).T
-    fastest = 3.6 * max(p.v_mean for p in members)
+    m, s, v = np.array([(*p.foretold, p.v_held) for p in members if math.isfinite(p.foretold[0])]).reshape(-1, 3).T
+    fastest = 3.6 * max(p.v_held for p in members)
     on = f"the margin of {m.size} of {len(members)} passes, the fastest at {fastest:.0f} km/h"
     w = (v / max(v, default=1.0)) ** FASTEST
     spread = float(w @ s / w.sum()) if m.size else math.inf
@@ -231,9 +233,9 @@ def _foretold(group: Group, members: Sequence[Pass]) -> FullSpeed:
 def fit_half(v: FloatArray, hit: BoolArray, times: FloatArray) -> FloatArray:
     """Speed (b,) [m/s] at which half of the passes have an event: logistic curve of greatest likelihood.
 
-    Of mean speeds `v` (m,) [m/s], whether a pass has one (m,), and how often each counts (b, m), a fit per row. The
-    width of the curve is kept within 1 ... 14 km/h, so that passes which separate cleanly have a speed too: the
-    middle of the gap. NaN where a row has passes of one kind only.
+    Of speeds `v` (m,) [m/s], of its event or else its fastest, whether a pass has one (m,), and how often each counts
+    (b, m), a fit per row. The width of the curve is kept within 1 ... 14 km/h, so that passes which separate cleanly
+    have a speed too: the middle of the gap. NaN where a row has passes of one kind only.
     """
     z = (v[None, None] - _SPEEDS[:, None, None]) / _WIDTHS[None, :, None]
     log_p = -np.logaddexp(0.0, np.where(hit, -z, z)).reshape(-1, v.size)

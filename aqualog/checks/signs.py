@@ -85,6 +85,7 @@ def _forward(windows: Windows, speed: FloatArray) -> Iterator[Doubt]:
     if "a_x" not in windows or speed.size < 3:
         return
     step = windows.step_s
+    speed = np.where(windows.slips, np.nan, speed)
     gained = np.gradient(speed, step)
     found = relate(changes(windows["a_x"], step), changes(gained, step), step, least=LONGITUDINAL)
     if found.is_sure and found.r < -AGAINST:

@@ -14,6 +14,7 @@ from aqualog.core.vehicle import Vehicle
 __all__ = ["EXTRA", "Gather", "Windows"]
 
 WINDOW = 0.5  # [s] over which changes are compared: longer than latencies, shorter than manoeuvres
+UNLIKE = 0.2  # [-] share by which wheels differ neither in curves nor by their radii (K)
 EXTRA = "delta_a_x"  # what `detect` adds: the measure of the resistance, where it is judged
 _AS_THEY_ARE = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "brake_pressure", "latitude", "longitude")
 
@@ -52,6 +53,15 @@ class Windows:
         if not wheels:
             return self.columns.get("v_x", np.zeros(0))
         return middle(wheels)
+
+    @property
+    def slips(self) -> BoolArray:
+        """Where the wheels differ by more than `UNLIKE` of the fastest: their median need not be the car's speed."""
+        if not self.wheels:
+            return np.zeros(self.speed.size, dtype=bool)
+        wheels = np.abs(np.stack(list(self.wheels.values())))
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.ptp(wheels, axis=0) > UNLIKE * wheels.max(axis=0))
 
 
 def middle(rows: list[FloatArray]) -> FloatArray:

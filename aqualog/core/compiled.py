@@ -189,7 +189,9 @@ def _compile_in_turn(dispatcher: Any) -> None:
 
     def save(signature: Any, compiled_code: Any) -> None:
         try:
-            keep(signature, compiled_code)
+            # seen once, while others compiled the same: numba had no object to keep; this process has its code
+            with suppress(RuntimeError):
+                keep(signature, compiled_code)
         finally:
             turn.give()
 

@@ -79,7 +79,7 @@ def calibrate_wet(
         Of the drives, for messages.
     vehicle : Vehicle
     known : mapping
-        Names of `KNOWN`: `tread` [mm], `pressure` [bar], and `depth` [mm] in place of the logs'.
+        Names of `KNOWN`: `tread` [mm], `pressure` [bar], and `depth` [mm] where the logs lack it.
 
     Returns
     -------
@@ -98,6 +98,9 @@ def calibrate_wet(
     fit = fit_water(passes, vehicle, tyre, p=told.p)
     notes = [f"{fit.lost} of {len(fit.used)} passes lose a front wheel; v_full scatters by {100 * fit.scatter:.0f} %"]
     notes += [f"{n}: no watered stretch" for n, own in by_drive.items() if not own]
+    own = [f"{w.name} {1e3 * w.windows[0].h_w:.2g} mm" for w in passes if w.windows and w.windows[0].h_w != told.depth]
+    if math.isfinite(told.depth) and own:
+        notes.append(f"the logs' own water depth counts, not the given one: {', '.join(own[:3])}")
     if "tyre.slip_slope_f" not in vehicle.given:
         notes.append(
             "the vehicle file does not give tyre.slip_slope_f: the default is taken as exact; see `slip-slope`"

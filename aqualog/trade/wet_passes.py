@@ -30,7 +30,7 @@ LEAST_V = 8.0  # [m/s]
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """What the user says of the passes: `depth` of the water [m], NaN where the logs say it; `tread` [m]; `p`. [Pa]"""
+    """What the user says of the passes: `depth` of the water [m] where logs lack it, or NaN; `tread` [m]; `p` [Pa]."""
 
     depth: float
     tread: float
@@ -118,17 +118,13 @@ def _windows(signals: Signals, vehicle: Vehicle, span: Span, told: Told) -> list
 
 def _depths(signals: Signals, span: Span, told: Told) -> tuple[float, float] | None:
     """Water before the left and the right front wheel: in the tracks, or on the lane. [m]"""
-    if math.isfinite(told.depth):
-        return told.depth, told.depth
     tracks = tracks_of(signals, span)
     if tracks is not None:
         return tracks
     t, h = signals.array("t"), signals.array("water_depth")
     own = h[(t >= span[0]) & (t <= span[1])]
-    if not np.isfinite(own).any():
-        return None
-    depth = float(np.nanmedian(own))
-    return depth, depth
+    depth = float(np.nanmedian(own)) if np.isfinite(own).any() else told.depth
+    return (depth, depth) if math.isfinite(depth) else None
 
 
 class _Course(NamedTuple):

@@ -131,7 +131,7 @@ def test_what_cannot_be_told():
 def passes(full, minor):
     speeds = np.repeat([70, 80, 90, 100, 110, 120], 5) * KMH
     return [
-        Pass(None, v, 4.0, 100.0, {"fl": int(v > minor * KMH)}, {"fl": int(v > full * KMH)}, {"fl": -0.1})
+        Pass(None, 0.1, np.full(40, v), {}, {"fl": (v,) * int(v > minor * KMH)}, {"fl": (v,) * int(v > full * KMH)})
         for v in speeds
     ]
 
@@ -151,7 +151,9 @@ def test_what_passes_that_are_slower_foretell():
     """The fastest passes count most; the interval is that of one, as all share tyre, water and laws."""
 
     def of(*found):
-        return _foretold((), [Pass(None, v, 4.0, 80.0, {}, {}, {}, (np.log(full * KMH), s)) for v, full, s in found])
+        return _foretold(
+            (), [Pass(None, 0.1, np.full(40, v), {}, {}, {}, (np.log(full * KMH), s)) for v, full, s in found]
+        )
 
     one, both = of((28.0, 120.0, 0.1)), of((28.0, 120.0, 0.1), (20.0, 150.0, 0.1))
     assert one.v / KMH == pytest.approx(120.0)

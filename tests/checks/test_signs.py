@@ -167,3 +167,11 @@ def test_a_driver_who_steers_against_a_slide_has_no_turned_steering():
     """Braking on snow: the axles slip, and the steering follows the yaw rate with the opposite sign."""
     slides = {n: x * (1.08 if n in ("omega_fl", "omega_fr") else 1.0) for n, x in DRIVE.items()}
     assert said({**slides, "steer_angle": -0.1 * DRIVE["yaw_rate"]}) == []
+
+
+def test_wheels_that_stand_and_spin_on_water_do_not_put_the_accelerometer_in_doubt():
+    wet = np.arange(DRIVE["v_x"].size) > 0.3 * DRIVE["v_x"].size
+    spinning = np.exp(np.cumsum(np.random.default_rng(5).standard_normal(wet.size)) * 0.01)
+    factor = {"f": np.where(wet, 0.0, 1.0), "r": np.where(wet, 2.0 * spinning, 1.0)}
+    wheels = {f"omega_{w}": DRIVE[f"omega_{w}"] * factor[w[0]] for w in ("fl", "fr", "rl", "rr")}
+    assert not [r for r in look(signals(DRIVE | wheels), CAR) if "a_x" in r.signals]

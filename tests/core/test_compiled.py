@@ -221,3 +221,13 @@ def test_nothing_is_read_as_pickle():
     )
     assert len(sources) > 300
     assert [f"{p.name}: {m[0]}" for p, text in sources.items() for m in risky.finditer(text)] == []
+
+
+def test_code_that_cannot_be_kept_is_used(monkeypatch):
+    from numba.core.caching import Cache
+
+    def nothing(*_):
+        raise RuntimeError("no compiled object yet")
+
+    monkeypatch.setattr(Cache, "save_overload", nothing)
+    assert compilation.compiled(lambda x: 2.0 * x)(3.0) == 6.0

@@ -44,7 +44,7 @@ def foretold(make, seed, runs=8):
         lane = slice(int((p.wet[0] + SETTLED_S) / p.dt), int(p.wet[1] / p.dt))
         v, low, high = (f[n][lane] for n in ("v_x_hat", "aquaplaning_margin_low", "aquaplaning_margin_high"))
         told = _foretold(f["full_speed_expected"][lane], v + low, v + high)
-        found.append(Pass(None, float(v.mean()), 3.0, 1.0, {}, {}, {}, told))
+        found.append(Pass(None, p.dt, v, {}, {}, {}, told))
     speed = full_speed._foretold((), found)
     return tuple(KMH * x for x in (p.v_full, speed.v, *speed.ci))
 

@@ -56,12 +56,16 @@ def test_the_numbers_of_a_day_are_found(day):
     assert [p.name for p in found.parameters if p.identified] == ["v_anchor", "contact_exponent"]
     assert len(found.passes) == 8
     assert any(p.v_lost > 0.0 for p in found.passes)
+    other = calibrate_wet(signals, names(signals), car, known | {"depth": 2.0 * known["depth"]})
+    assert other.parameters == found.parameters
+    assert other.notes[1].startswith("the logs' own water depth counts, not the given one: pass 1 2 mm, pass 2 2 mm")
 
 
 def test_the_logs_own_depth_counts(day):
     car, _, known, signals = day
-    (own,) = passes_of(signals[0], car, "a", Told(np.nan, 1.6e-3, known["pressure"] * 1e5))
-    assert own.windows[0].h_w == pytest.approx(known["depth"] * 1e-3, rel=0.1)
+    for given in (np.nan, 2e-3 * known["depth"]):
+        (own,) = passes_of(signals[0], car, "a", Told(given, 1.6e-3, known["pressure"] * 1e5))
+        assert own.windows[0].h_w == pytest.approx(known["depth"] * 1e-3, rel=0.1)
 
 
 @pytest.mark.parametrize("criterion", ["spin-down"])

@@ -72,7 +72,7 @@ def rising_number(found: Sequence[Pass]) -> Check | None:
         return None
     v = np.array([p.v_mean for p in part]) / measures.TEN
     columns = [np.ones(v.size), v - v.mean()]
-    number = measures.over_passes(columns, np.array([sum(p.minor.values()) / p.seconds for p in part]))
+    number = measures.over_passes(columns, np.array([sum(map(len, p.minor.values())) / p.seconds for p in part]))
     deepest = np.array([-min(x for x in p.deepest.values()) for p in part])
     depth = measures.over_passes(columns, 100.0 * deepest)
     if number is None or depth is None:

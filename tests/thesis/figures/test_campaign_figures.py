@@ -220,9 +220,8 @@ def test_c42_by_hand(monkeypatch, a, b, share, verdicts):
 
 def over_water(kmh, *, minor=0, full=0, deepest=-0.01):
     info = SimpleNamespace(index=0)
-    return Pass(
-        info, kmh * KMH, 4.0, 100.0, {"fl": 0, "fr": minor}, {"fl": 0, "fr": full}, {"fl": -0.001, "fr": deepest}
-    )
+    v, slip = np.full(40, kmh * KMH), {w: np.full(40, x) for w, x in (("fl", -0.001), ("fr", deepest))}
+    return Pass(info, 0.1, v, slip, {"fl": (), "fr": (v[0],) * minor}, {"fl": (), "fr": (v[0],) * full})
 
 
 @pytest.mark.parametrize(("first", "verdict"), [(90, REPRODUCED), (70, NOT_REPRODUCED)])
