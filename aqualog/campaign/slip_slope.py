@@ -25,6 +25,7 @@ __all__ = [
 
 S_MAX = 0.10  # [-] a wheel with more slip spins; a lower limit would cut off small contacts (0.3 over 3 is 0.1)
 WIND_UP = 0.30  # [-] traction beyond which the curve bends, as in `aqualog slip-slope`
+TIED = 0.3  # [-] correlation of traction and speed in a bin, from which on one hides in the other
 SLOPE_MAX = 300.0  # [-] no tyre has more
 SPAN_MAX = 3.0  # [-] upper over lower end of an interval; wider ones show little more than that a slope exists
 
@@ -226,10 +227,13 @@ def fit_slope(
     # on water the slope changes with the speed, and mu / v looks like a / v: there, the one hides in the other
     if is_open and bare.road == "dry" and np.ptp(u) > 0.0:
         columns, scatters, noisy = [*columns, u], [*scatters, False], [*noisy, False]
+    x, v = mu - mu.mean(), pool.columns["v_x"]
+    # where the traction follows the speed, its coefficient would hold the change of the slope with the speed
+    if bare.road == "wet" and abs(float(np.mean(x * (v - v.mean())))) > TIED * float(mu.std() * v.std()):
+        columns, scatters, noisy = [*columns, mu * (v - v.mean())], [*scatters, False], [*noisy, False]
     found = estimate(
         Design(np.stack(columns), slip, pool.run, pool.step, tuple(scatters), tuple(noisy)), robust=robust
     )  # fmt: skip
-    x = mu - mu.mean()
     # error of 1 / slope per error of the delay: slope of a / v over the traction, within and between the runs
     shared = abs(float(np.mean(x * u)) / float(np.mean(x * x)))
     return _told(bare, found, columns, slip, half_tau * shared, limits, is_open=is_open)

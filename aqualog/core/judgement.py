@@ -39,7 +39,7 @@ class Episode:
     all of them share it. `v_x` is the mean speed [m/s], `distance_m` the way [m]; NaN where the speed is unknown.
     `decided_by` are the detectors behind the decision. `delta_a_x_max` is the largest resistance measure [m/s²],
     `slip_min` and `slip_max` the least and greatest slip [-]; NaN where unknown. `events` are indices into the events
-    of the drive.
+    of the drive. `v_full` is the speed at which the first wheel was lost for good [m/s], NaN without one.
     """
 
     kind: EpisodeKind
@@ -56,6 +56,7 @@ class Episode:
     slip_max: float
     distance_m: float
     events: tuple[int, ...]
+    v_full: float = math.nan
 
     @property
     def duration_s(self) -> float:
@@ -67,21 +68,22 @@ class Episode:
         return {
             "kind": self.kind, "start_s": _short(self.start_s), "end_s": _short(self.end_s),
             "wheels": list(self.wheels), "axle": self.axle, "side": self.side, "severity": self.severity,
-            "v_x_kmh": _short(_KMH * self.v_x), "decided_by": list(self.decided_by),
-            "delta_a_x_max": _short(self.delta_a_x_max), "slip_min": _short(self.slip_min),
-            "slip_max": _short(self.slip_max), "distance_m": _short(self.distance_m), "events": list(self.events),
+            "v_x_kmh": _short(_KMH * self.v_x), "v_full_kmh": _short(_KMH * self.v_full),
+            "decided_by": list(self.decided_by), "delta_a_x_max": _short(self.delta_a_x_max),
+            "slip_min": _short(self.slip_min), "slip_max": _short(self.slip_max),
+            "distance_m": _short(self.distance_m), "events": list(self.events),
         }  # fmt: skip
 
     @staticmethod
     def of_document(e: Mapping[str, Any]) -> Episode:
         """Return the episode that JSON holds."""
-        speed, delta, least, most, metres = (
-            math.nan if (x := e.get(n)) is None else float(x)  # results of before 0.35.0 lack `slip_max`
-            for n in ("v_x_kmh", "delta_a_x_max", "slip_min", "slip_max", "distance_m")
+        speed, delta, least, most, metres, lost = (
+            math.nan if (x := e.get(n)) is None else float(x)  # older results lack the last ones
+            for n in ("v_x_kmh", "delta_a_x_max", "slip_min", "slip_max", "distance_m", "v_full_kmh")
         )
         return Episode(
             e["kind"], e["start_s"], e["end_s"], tuple(e["wheels"]), e["axle"], e["side"], e["severity"], speed / _KMH,
-            tuple(e["decided_by"]), delta, least, most, metres, tuple(e["events"]),
+            tuple(e["decided_by"]), delta, least, most, metres, tuple(e["events"]), lost / _KMH,
         )  # fmt: skip
 
 

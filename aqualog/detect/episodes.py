@@ -235,6 +235,7 @@ def _episode(group: Sequence[_Numbered], way: Stretch, span: tuple[float, float]
         # a drop of the slip slope has amounts of slip there, without their sign
         max(_known((e for e in events if e.detector in _WHEELS), "slip_max"), default=math.nan),
         metres if seconds > 0.0 else math.nan, tuple(sorted(i for i, _ in group)),
+        next(iter(_known((e for e in events if e.wheel and e.severity == "full"), "v_x")), math.nan),
     )  # fmt: skip
 
 

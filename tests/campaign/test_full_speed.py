@@ -234,3 +234,18 @@ def test_a_line_worse_than_a_constant_is_not_reliable():
     assert found.r2 < 0.0
     assert not found.reliable
     assert "r2" in found.reason
+
+
+@pytest.mark.parametrize("follows", [0.0, 0.01])
+def test_where_the_traction_follows_the_speed_its_slope_is_that_of_the_middle(follows):
+    """Runs that sweep the speed with rising traction: the slope falls meanwhile, which is no part of a slope."""
+    rng = np.random.default_rng(5)
+    run = np.repeat(np.arange(8), 40)
+    v = np.tile(np.linspace(23.6, 26.4, 40), 8)
+    mu = 0.12 + 0.004 * rng.normal(size=8)[run] + follows * (v - 25.0) + 0.01 * np.sin(np.arange(run.size) / 3.0)
+    slip = mu * (1.0 + 0.12 * (v - 25.0)) / 22.0 + 1e-4 * rng.normal(size=run.size)
+    bare = SlopeRow((), "rr", "wet", 85.0, 95.0, 8, run.size, (0.1, 0.14), 25.0)
+    pool = Pool(run, np.arange(run.size), {"mu": mu, "slip": slip, "u": 0.0 * mu, "v_x": v})
+    found = fit_slope(bare, pool, [None] * 8)
+    assert found.slope == pytest.approx(22.0, rel=0.1)
+    assert found.slope_ci[0] < 22.0 < found.slope_ci[1]

@@ -9,6 +9,7 @@ import pytest
 from aqualog.core.records import Event, Unavailable
 from aqualog.detect.episodes import Way, episodes_of
 from aqualog.detect.verdict import NEVER_TOGETHER, judge
+from aqualog.report.drive.judged import headline
 
 
 def event(detector, start, end, wheel=None, severity="partial", **evidence):
@@ -42,6 +43,12 @@ def test_one_pass_is_one_episode_with_all_that_is_known_of_it():
     assert e.v_x == pytest.approx(28.0)
     assert e.distance_m == pytest.approx(28.0 * 9.5)
     assert e.events == (0, 1, 2, 3, 4, 5)
+    assert math.isnan(e.v_full)
+    lost = (event("spin_down", 9.0 + i, 11.0, w, "full", v_x=29.0 + i) for i, w in enumerate(("fr", "fl")))
+    (e,) = episodes_of([*LANE, *lost], way)
+    assert e.v_full == 29.0
+    assert ", full from 104 km/h on" in headline(judge([replace(LANE[1], severity="full"), event("spin_down", 9.0, 11.0, "fr", "full", v_x=29.0)],
+                                                       [], ("joint_cusum",), judged_s=20.0, way=way))  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -286,6 +286,7 @@ JUDGEMENT = (
         text("side", "side of all of these wheels; null where both", ("left", "right"), null=True),
         text("severity", "partial or full", ("partial", "full")),
         number("v_x_kmh", "km/h", "mean speed", null=True),
+        number("v_full_kmh", "km/h", "speed at which the first wheel was lost; null where none was", null=True),
         several("decided_by", "detectors that decided"),
         number("delta_a_x_max", "m/s^2", "greatest resistance measure (2.9)", null=True),
         number("slip_min", "-", "least slip", null=True),

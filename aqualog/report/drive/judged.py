@@ -77,6 +77,8 @@ def episode_sentence(episode: Episode) -> str:
     speed = f"{number(KMH * episode.v_x, 0)} km/h" if math.isfinite(episode.v_x) else ""
     wheels = ", ".join(_WHEELS[w] for w in episode.wheels)
     severity = episode.severity if episode.kind == "aquaplaning" else ""
+    if severity == "full" and math.isfinite(episode.v_full):
+        severity += f" from {number(KMH * episode.v_full, 0)} km/h on"
     told = (f"{episode.start_s:.1f}–{episode.end_s:.1f} s", speed, wheels, severity)
     return ", ".join(x for x in told if x)
 
