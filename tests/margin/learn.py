@@ -20,7 +20,7 @@ from aqualog.detect.detector import Scene
 from aqualog.detect.margin import emissions, state
 from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.recursion import scan
-from aqualog.detect.margin.state import FULL_SPEEDS, NODES, Emissions, Filter, FilterParams, Inputs
+from aqualog.detect.margin.state import FULL_SPEEDS, NODES, TAIL, Emissions, Filter, FilterParams, Inputs
 from aqualog.detect.margin.watch import params
 from aqualog.features.stream import FeatureStream
 from aqualog.model.drawing import KMH, SCORING_POOL, TUNING_POOL, Drawing
@@ -45,14 +45,10 @@ BANDWIDTH = 0.06  # [-] of the log ratio
 SHARP = 1.0  # how surely a slip of 1 in its feature tells which way a wheel goes
 SHARES = (0.6, 0.1, 0.3)  # of `LAWS` (K)
 OF_TEN = (0, 0, 0, 0, 0, 0, 1, 2, 2, 2)  # the same among passes with water under one side alone
-ONE_SIDE, SHARE_ONE = (
-    len(LAWS),
-    0.25,
-)  # its law, of all others together, and its share of wet road, that of snow above (K)
+ONE_SIDE, SHARE_ONE = len(LAWS), 0.25  # its law, of all others together; its share of wet road, that of snow above (K)
 KINDS, KINDS_ONE = 8, 4  # of dry road, as many of wet, and of other surfaces; of each of these under one side
 LEAST = 1e-3  # [-] of a variance
 _N, _Z = len(state.FEATURES), state.COVARIATES
-_TAIL = FilterParams._field_defaults["tail"]
 NEUTRAL = Emissions(
     np.zeros((1, NODES.size, _N, _Z)), np.tile(1e9 * np.eye(_N), (1, NODES.size, 1, 1)), np.ones((1, NODES.size)),
     np.zeros((1, NODES.size)), np.ones(1), np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((2, _N, _Z)), np.tile(1e9 * np.eye(_N), (2, 1, 1)),
@@ -74,7 +70,7 @@ def laws_of(x, z, where, share):
             fit = np.linalg.solve(form.T @ (w[:, None] * form) + LEAST * np.eye(_Z + 1), form.T @ (w[:, None] * x))
             left = x - form @ fit
             S = left.T @ (w[:, None] * left) / near.sum() + LEAST * np.eye(_N)
-            w = near * (_TAIL + _N) / (_TAIL + np.einsum("ni,ij,nj->n", left, np.linalg.inv(S), left))
+            w = near * (TAIL + _N) / (TAIL + np.einsum("ni,ij,nj->n", left, np.linalg.inv(S), left))
         mean[k], scatter[k] = fit[:_Z].T, S
     return mean, scatter
 
@@ -90,10 +86,10 @@ def kinds_of(x, z, rng, kinds=KINDS):
         left = x - z @ mean[:, :, :used].transpose(0, 2, 1)
         square = np.einsum("kni,kij,knj->kn", left, np.linalg.inv(S), left)
         logs = np.log(share)[:, None] - 0.5 * np.linalg.slogdet(S)[1][:, None]
-        logs = logs - 0.5 * (_TAIL + _N) * np.log1p(square / _TAIL)
+        logs = logs - 0.5 * (TAIL + _N) * np.log1p(square / TAIL)
         r = np.exp(logs - logs.max(axis=0))
         r /= r.sum(axis=0)
-        w = r * (_TAIL + _N) / (_TAIL + square)
+        w = r * (TAIL + _N) / (TAIL + square)
         share = r.mean(axis=1)
         for k, form in enumerate(w[:, :, None] * z):
             mean[k, :, :used] = np.linalg.solve(form.T @ z + LEAST * np.eye(used), form.T @ x).T

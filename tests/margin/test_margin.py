@@ -11,7 +11,7 @@ from aqualog.detect.margin import recursion
 from aqualog.detect.margin.emissions import emissions_of
 from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.recursion import scan
-from aqualog.detect.margin.state import NODES, Filter, FilterParams, Inputs
+from aqualog.detect.margin.state import NODES, TAIL, Filter, FilterParams, Inputs
 from aqualog.detect.margin.watch import params
 from aqualog.detect.stream import detect_drive
 from aqualog.features.stream import FeatureStream
@@ -92,6 +92,19 @@ def test_a_mixture_of_laws_is_between_them():
     mixed, rare, *alone = (scan(p, own, Filter.new(p, own), x)[0][-1, k] for own in each)
     assert min(alone) + 0.5 < mixed < max(alone) - 0.5
     assert abs(rare - mixed) > 0.2  # how rare each way is counts
+    assert np.isnan(scan(p, t, Filter.new(p, t), x)[0][4, 400:600]).all()  # of a dry road no distance is compared
+
+
+@pytest.mark.parametrize("drivetrain", DRIVETRAINS)
+def test_likelihoods_are_student_s(drivetrain):
+    t, rng = emissions_of(drivetrain), np.random.default_rng(1)
+    z, x, P, found = np.array([1.0, 0.2, 1.4]), rng.normal(0.0, 3.0, 5), rng.uniform(0.0, 0.5, 5), np.empty(t.road.size)
+    left, S = x - t.kind_mean @ z, t.kind_scatter + np.diag(P)
+    square = np.einsum("ki,kij,kj->k", left, np.linalg.inv(S), left)
+    due = -0.5 * np.linalg.slogdet(S)[1] - 0.5 * (TAIL + 5) * np.log1p(square / TAIL)
+    flat = t.in_columns()
+    recursion._scores(flat.kind_mean, flat.kind_scatter, z, x, P, np.zeros(t.road.size), found)
+    assert found == pytest.approx(due, abs=1e-9)
 
 
 def test_a_wet_drive_has_a_distance_and_a_warning(wet):
@@ -124,8 +137,7 @@ def test_slips_of_full_aquaplaning_count_where_nothing_shakes():
     z, P, n = np.array([1.0, np.log(80 / 108), np.arcsinh(8.0)]), np.array([R, 0.1, 0.1, M, M]), t.mean.shape[2]
     x, score = np.array([1.7, 6.0, 6.0, 0.0, 0.0]), np.empty((2, n))
     for k, calm in enumerate((0.0, 0.3)):
-        work = np.full(n, calm), np.empty((5, 5, n)), np.empty((9, n))
-        recursion._scores(t.mean, t.scatter, z, x, P, 6.0, *work, score[k])
+        recursion._scores(t.mean, t.scatter, z, x, P, np.full(n, calm), score[k])
     never, sometimes = score[:, near] - score[:, far]
     assert sometimes > max(never + 1.5, 3.0)
 

@@ -20,6 +20,7 @@ from aqualog.detect.margin.state import (
     LOG_STEP,
     NODES,
     ROWS,
+    TAIL,
     Emissions,
     Filter,
     FilterParams,
@@ -36,10 +37,12 @@ _LOG = np.log(FULL_SPEEDS)
 _QUANTILES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 _SURE = 1.645  # standard deviations of a quantile of 95 %
 _STILL = 0.25  # variance of what wheels shake that shake as on dry road, of 0.6 s in log variance
+_NEVER, _FAINT = -40.0, 1e-12  # of an evidence: below the best, and itself
 _UNKNOWN = 1e4  # variance of a feature that is missing
 _V, _A, _R, _D, _U_F, _U_R, _B, _VAR, _VAR_B, _S_F, _S_R = 0, 1, 2, 3, 5, 7, 9, 10, 12, 13, 15  # columns of a step
 _NI = len(Inputs._fields)
 _LEAST, _LEAST_B = 1e-10, 1e-5  # of a slip's variance, and of the accelerometer's [(m/s^2)^2]
+_LEAST_S = 1e-9  # of a feature's variance that the others leave
 
 
 @part
@@ -49,16 +52,16 @@ def _slip(u, slope, rolling, friction):  # type: ignore[no-untyped-def]
 
 
 @part
-def _learn_line(s, x, left, lasting, trust, tail):  # type: ignore[no-untyped-def]
+def _learn_line(s, x, left, lasting, trust):  # type: ignore[no-untyped-def]
     """Learn offset and slope of a line, `s[0]` and `s[1]`, by Kalman's filter; their covariance follows them.
 
     `left` is what was seen at x less the line, `lasting` its variance beside the line's, `trust` 0 to 1. By Student's
-    law with `tail` degrees of freedom the further it lies from the line the less it counts: a wheel that floats slips
+    law with `TAIL` degrees of freedom the further it lies from the line the less it counts: a wheel that floats slips
     hundredfold, and what little of it was trusted would bend the line for minutes.
     """
     P_m, P_q = s[2] + x * s[3], s[3] + x * s[4]
     S = P_m + x * P_q + lasting
-    trust *= (tail + 1.0) / (tail + max(left * left / S, 1.0))
+    trust *= (TAIL + 1.0) / (TAIL + max(left * left / S, 1.0))
     gain_m, gain_q = trust * P_m / S, trust * P_q / S
     s[0] += gain_m * left
     s[1] += gain_q * left
@@ -86,7 +89,7 @@ def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
     if not math.isnan(row[_R] + row[_A]):
         known, S, gain = _drag(g, row[_A], (row[_V] / p.pace) ** 2)
         left, S = row[_R] - known, S + p.noise_R**2 + m.samples[2]
-        share = trust * (p.tail + 1.0) / ((p.tail + max(left * left / S, 1.0)) * S)
+        share = trust * (TAIL + 1.0) / ((TAIL + max(left * left / S, 1.0)) * S)
         for i in range(3):
             g[0, i] += share * gain[i] * left
             for j in range(3):
@@ -99,7 +102,7 @@ def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
         if math.isnan(row[_D + i] + front + rear):
             continue
         away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
-        _learn_line(g, front + rear, away, p.noise_D**2 + row[_VAR + i], trust, p.tail)
+        _learn_line(g, front + rear, away, p.noise_D**2 + row[_VAR + i], trust)
 
 
 @part
@@ -171,57 +174,71 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
     return traction / max(steps, 1.0), more
 
 
-@partial(part, is_inline=False)  # from two places: its code once
-def _scores(mean, scatter, z, x, P, tail, calm, A, y, score):  # type: ignore[no-untyped-def]
-    """Fill log likelihoods (k,) of the features x by Student's law, of means by covariates z and covariances.
-
-    `mean` (features, covariates, k), `scatter` (features, features, k): the compiler makes vectors of the innermost
-    loops, over k. A covariance is A D A', with ones and 1 / D on the diagonal of A: no roots, and one logarithm.
-    `calm` (k,): probability that wheels shake as on dry road, whatever drag and slips show.
-    """
-    n, determinant, square = score.size, y[_NX], y[_NX + 1]
-    still, shakes = (P[3] + _STILL) * (P[4] + _STILL), x[3] * x[3] / (P[3] + _STILL) + x[4] * x[4] / (P[4] + _STILL)
-    determinant[:] = 1.0
-    square[:] = 0.0
-    for i in range(_NX):
-        if i == 3:  # drag and slips are through
-            for k in range(n):
-                y[_NX + 2, k] = determinant[k] * still
-                y[_NX + 3, k] = square[k] + shakes
-        for k in range(n):
-            y[i, k] = x[i]
-            A[i, i, k] = scatter[i, i, k] + P[i]
-        for c in range(COVARIATES):
-            for k in range(n):
-                y[i, k] -= mean[i, c, k] * z[c]
-        for j in range(i):
-            for k in range(n):
-                A[j, i, k] = scatter[i, j, k]
-            for q in range(j):
-                for k in range(n):
-                    A[j, i, k] -= A[q, i, k] * A[j, q, k]
-            for k in range(n):
-                A[i, j, k] = A[j, i, k] * A[j, j, k]
-                A[i, i, k] -= A[j, i, k] * A[i, j, k]
-                y[i, k] -= A[i, j, k] * y[j, k]
-        for k in range(n):
-            S = max(A[i, i, k], 1e-9)
-            determinant[k] *= S
-            A[i, i, k] = 1.0 / S
-            square[k] += y[i, k] * y[i, k] * A[i, i, k]
-    for k in range(n):
-        score[k] = -0.5 * math.log(determinant[k]) - 0.5 * (tail + _NX) * math.log1p(square[k] / tail)
-        if calm[k] > 0.0:
-            more = -0.5 * math.log(y[_NX + 2, k]) - 0.5 * (tail + _NX) * math.log1p(y[_NX + 3, k] / tail) - score[k]
-            score[k] += math.log((1.0 - calm[k]) + calm[k] * math.exp(min(more, 300.0)))
+@part
+def _left(mean, z, x, i, k):  # type: ignore[no-untyped-def]
+    """What a feature shows beyond its mean by the covariates."""
+    return x[i] - mean[i, 0, k] * z[0] - mean[i, 1, k] * z[1] - mean[i, 2, k] * z[2]
 
 
 @part
-def _place(log_v, i):  # type: ignore[no-untyped-def]
-    """Node below a cell of the full speed, and how far it is on the way to the next."""
-    place = min(max((_LOG[i] - log_v - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
-    n = int(place)
-    return n, place - n
+def _odds(determinant, square):  # type: ignore[no-untyped-def]
+    """Student's density, less what all have in common: roots and products, of which the compiler makes vectors."""
+    q = 1.0 + square / TAIL
+    q2 = q * q
+    q4 = q2 * q2
+    return 1.0 / math.sqrt(determinant * q4 * q4 * q2 * q)
+
+
+@part
+def _count(S, y, determinant, square):  # type: ignore[no-untyped-def]
+    """Count a feature by the variance that those before leave; return one over that, determinant and square."""
+    S = max(S, _LEAST_S)
+    return 1.0 / S, determinant * S, square + y * y / S
+
+
+@partial(part, is_inline=False)  # from two places: its code once
+def _scores(M, C, z, x, P, calm, score):  # type: ignore[no-untyped-def]
+    """Fill log likelihoods (k,) of the features x by Student's law, of means by covariates z and covariances.
+
+    M (features, covariates, k), C (features, features, k): the compiler makes vectors over k. A covariance is A D A'
+    with ones on the diagonal of A. Written out by columns, it stays in registers.
+    `calm` (k,): probability that wheels shake as on dry road, whatever drag and slips show.
+    """
+    still, shakes = (P[3] + _STILL) * (P[4] + _STILL), x[3] * x[3] / (P[3] + _STILL) + x[4] * x[4] / (P[4] + _STILL)
+    for k in range(score.size):
+        y0 = _left(M, z, x, 0, k)
+        d, determinant, square = _count(C[0, 0, k] + P[0], y0, 1.0, 0.0)
+        c1, c2, c3, c4 = C[1, 0, k], C[2, 0, k], C[3, 0, k], C[4, 0, k]
+        a1, a2, a3, a4 = c1 * d, c2 * d, c3 * d, c4 * d
+        y1, y2 = _left(M, z, x, 1, k) - a1 * y0, _left(M, z, x, 2, k) - a2 * y0
+        y3, y4 = _left(M, z, x, 3, k) - a3 * y0, _left(M, z, x, 4, k) - a4 * y0
+        C2, C3, C4 = C[2, 2, k] + P[2] - a2 * c2, C[3, 3, k] + P[3] - a3 * c3, C[4, 4, k] + P[4] - a4 * c4
+        C32, C42, C43 = C[3, 2, k] - a3 * c2, C[4, 2, k] - a4 * c2, C[4, 3, k] - a4 * c3
+        d, determinant, square = _count(C[1, 1, k] + P[1] - a1 * c1, y1, determinant, square)
+        c2, c3, c4 = C[2, 1, k] - a2 * c1, C[3, 1, k] - a3 * c1, C[4, 1, k] - a4 * c1
+        a2, a3, a4 = c2 * d, c3 * d, c4 * d
+        y2, y3, y4 = y2 - a2 * y1, y3 - a3 * y1, y4 - a4 * y1
+        C3, C4, C32, C42, C43 = C3 - a3 * c3, C4 - a4 * c4, C32 - a3 * c2, C42 - a4 * c2, C43 - a4 * c3
+        d, determinant, square = _count(C2 - a2 * c2, y2, determinant, square)
+        even = _odds(determinant * still, square + shakes)  # drag and slips are through
+        a3, a4 = C32 * d, C42 * d
+        y3, y4 = y3 - a3 * y2, y4 - a4 * y2
+        d, determinant, square = _count(C3 - a3 * C32, y3, determinant, square)
+        c4 = C43 - a4 * C32
+        a5 = c4 * d
+        d, determinant, square = _count(C4 - a4 * C42 - a5 * c4, y4 - a5 * y3, determinant, square)
+        score[k] = (1.0 - calm[k]) * _odds(determinant, square) + calm[k] * even
+    for k in range(score.size):
+        score[k] = math.log(max(score[k], 1e-300))
+
+
+@part
+def _places(log_v, at, above):  # type: ignore[no-untyped-def]
+    """Fill the node below each cell of the full speed, and how far the cell is on the way to the next node."""
+    for i in range(_NV):
+        place = min(max((_LOG[i] - log_v - NODES[0]) / LOG_STEP, 0.0), _NN - 1.001)
+        at[i] = int(place)
+        above[i] = place - at[i]
 
 
 @part
@@ -237,16 +254,16 @@ def _is(t, m, road):  # type: ignore[no-untyped-def]
 @part
 def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
     """Fill the probabilities of laws and full speeds (laws, full speeds), given that there is water."""
-    best = -1e300
-    for law in range(t.law.size):
-        for i in range(_NV):
-            beyond = max(v - FULL_SPEEDS[i], 0.0) / p.brave
+    best, total = -1e300, 0.0
+    for i in range(_NV):
+        beyond = max(v - FULL_SPEEDS[i], 0.0) / p.brave
+        for law in range(t.law.size):
             w[law, i] = m.evidence[law, i] - 0.5 * beyond * beyond
             best = max(best, w[law, i])
-    total = 0.0
     for law in range(t.law.size):
         for i in range(_NV):
-            w[law, i] = t.law[law] * t.prior[i] * math.exp(w[law, i] - best)
+            away = w[law, i] - best
+            w[law, i] = t.law[law] * t.prior[i] * math.exp(away) if away > _NEVER else 0.0
             total += w[law, i]
     for law in range(t.law.size):
         for i in range(_NV):
@@ -256,12 +273,12 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
 @part
 def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
     """Let the window speak: probabilities of the kinds of road, evidence on the full speeds."""
-    z, known, P, A, y, score, nodes, _, even = s
+    z, known, P, score, nodes, _, even, at, above = s
     z[0], z[1], z[2] = 1.0, math.log(v / 30.0), math.asinh(traction / 0.02)
     known[0], known[1], known[2] = 1.0, z[1], min(z[2], p.most_u)
     for k in range(score.size):
         even[k] = p.calm_road if t.road[k] == 1 else 0.0
-    _scores(t.kind_mean, t.kind_scatter, known, m.x[0], m.x[1], p.tail, even, A, y, score)
+    _scores(t.kind_mean, t.kind_scatter, known, m.x[0], m.x[1], even, score)
     best = -1e300
     for k in range(score.size):
         score[k] = p.weight * score[k]
@@ -272,23 +289,26 @@ def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
         total += m.kinds[k]
     for k in range(score.size):
         m.kinds[k] /= total
+    keep, heard = math.exp(-p.dt / p.keep_s), _is(t, m, 1) > p.heard
+    for law in range(t.law.size):
+        for i in range(_NV):
+            kept = keep * m.evidence[law, i]
+            m.evidence[law, i] = kept if abs(kept) > _FAINT else 0.0
+    if not heard:
+        return
     # how much drag and shake belong to a distance differs from law to law more than what is learnt
     for i in range(_NX):
         P[i] = m.x[1, i]
     P[0], P[3], P[4] = P[0] + p.law_R**2, P[3] + p.law_M**2, P[4] + p.law_M**2
-    keep, log_v, heard = math.exp(-p.dt / p.keep_s), math.log(v), _is(t, m, 1) > p.heard
-    if heard:
-        for k in range(nodes.size):
-            even[k] = p.calm
-        _scores(t.mean, t.scatter, z, m.x[0], P, p.tail, even, A, y, nodes)
-    for i in range(_NV):
-        n, a = _place(log_v, i)
-        for law in range(t.law.size):
-            m.evidence[law, i] *= keep
-            if heard:
-                at = law * _NN + n
-                below, above = p.weight * (nodes[at] + t.ways[law, n]), p.weight * (nodes[at + 1] + t.ways[law, n + 1])
-                m.evidence[law, i] = m.evidence[law, i] + (1.0 - a) * below + a * above
+    for k in range(nodes.size):
+        even[k] = p.calm
+    _scores(t.mean, t.scatter, z, m.x[0], P, even, nodes)
+    for law in range(t.law.size):
+        own, ways = nodes[law * _NN : (law + 1) * _NN], t.ways[law]
+        for n in range(_NN):
+            own[n] = p.weight * (own[n] + ways[n])
+        for i in range(_NV):
+            m.evidence[law, i] += (1.0 - above[i]) * own[at[i]] + above[i] * own[at[i] + 1]
 
 
 @part
@@ -310,28 +330,33 @@ def _predict(p, t, m):  # type: ignore[no-untyped-def]
 
 
 @part
-def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
-    """Fill what is put out; distances are from the car's own speed, contact from where the tables begin."""
-    log_at, v = math.log(max(v, p.v_least)), abs(v)
-    m.out[0] = wet
+def _distance(p, t, m, v, s):  # type: ignore[no-untyped-def]
+    """Fill the quantiles of the distance, and contact; return the probability that full aquaplaning is near."""
+    w, at, above = s[5], s[7], s[8]
     near, total, q, L = 0.0, 0.0, 0, 0.0
-    edge = _LOG[0] - 0.5 * LOG_STEP
-    limit = math.log(v + p.near)
+    edge, limit = _LOG[0] - 0.5 * LOG_STEP, math.log(v + p.near)
     for i in range(_NV):
-        n, a = _place(log_at, i)
         here = 0.0
         for law in range(t.law.size):
             here += w[law, i]
-            L += w[law, i] * ((1.0 - a) * t.contact[law, n] + a * t.contact[law, n + 1])
+            L += w[law, i] * ((1.0 - above[i]) * t.contact[law, at[i]] + above[i] * t.contact[law, at[i] + 1])
         near += here * min(max((limit - edge) / LOG_STEP, 0.0), 1.0)
         while q < 5 and total + here >= _QUANTILES[q] and here > 0.0:
             m.out[2 + q] = math.exp(edge + LOG_STEP * (_QUANTILES[q] - total) / here) - v
             q += 1
         total += here
         edge += LOG_STEP
+    m.out[7] = L
+    m.out[9] = m.out[4] + v
+    return near
+
+
+@part
+def _fill(p, m, wet, near):  # type: ignore[no-untyped-def]
+    """Fill what is put out of water, and whether the road shows it."""
+    m.out[0] = wet
     # without a slip that is known the distance is what was assumed before: no reason to warn
     m.out[1] = near * wet if m.x[1, 1] < p.vague else 0.0
-    m.out[7] = L
     # what a car has not shown on dry road yet is no sign of water
     x, P = m.x[0], m.x[1]
     drag = max(math.asinh(p.drags / p.scale_R), _SURE * math.sqrt(P[0]))
@@ -340,7 +365,6 @@ def _fill(p, t, m, v, w, wet):  # type: ignore[no-untyped-def]
     both = x[1] * x[2] > 0.0 and abs(x[2]) > max(p.both, _SURE * math.sqrt(P[2])) and x[0] > -drag
     shakes = max(x[3], x[4]) > max(p.shakes, _SURE * m.body[2])
     m.out[8] = 1.0 if drags or both or shakes else 0.0
-    m.out[9] = m.out[4] + v
 
 
 @part
@@ -363,7 +387,6 @@ def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
         m.window[at, k] = row[k]
     _predict(p, t, m)
     traction, more = _gather(p, m)
-    w = s[7]
     speed = max(v, p.v_least)
     x, P = m.x[0], m.x[1]
     own = (
@@ -373,14 +396,19 @@ def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
         for a in (1, 3):
             x[a], x[a + 1] = x[a + 1], x[a]
             P[a], P[a + 1] = P[a + 1], P[a]
+    _places(math.log(speed), s[7], s[8])
     if v > p.v_least:
         _judge(p, t, m, speed, traction, s)
-    _weights(p, t, m, speed, w)
     wet, dry = _is(t, m, 1), _is(t, m, 0)
     for i in range(2):
         _learn_shake(p, m.sides[i, 5:], own[i], dry)
     _learn_shake(p, m.body, _shake_of_body(m), dry)
-    _fill(p, t, m, v, w, wet)
+    near = 0.0
+    m.out[:] = math.nan
+    if wet > p.heard:
+        _weights(p, t, m, speed, s[5])
+        near = _distance(p, t, m, abs(v), s)  # from the car's own speed
+    _fill(p, m, wet, near)
 
 
 @part
@@ -414,11 +442,10 @@ def _push(p, t, m, x, out, row, s):  # type: ignore[no-untyped-def]
 def _scan(p, t, m, x):  # type: ignore[no-untyped-def]
     out = np.empty((m.out.size, x.shape[1]))
     kinds, nodes = m.kinds.size, t.law.size * _NN
-    most = max(kinds, nodes)
     # what a step works with and none remembers: parts that allocate nothing count no references
     s = (
-        np.empty(COVARIATES), np.empty(COVARIATES), np.empty(_NX), np.empty((_NX, _NX, most)),
-        np.empty((_NX + 4, most)), np.empty(kinds), np.empty(nodes), np.empty((t.law.size, _NV)), np.empty(most),
+        np.empty(COVARIATES), np.empty(COVARIATES), np.empty(_NX), np.empty(kinds), np.empty(nodes),
+        np.empty((t.law.size, _NV)), np.empty(max(kinds, nodes)), np.empty(_NV, np.int64), np.empty(_NV),
     )  # fmt: skip
     _push(p, t, m, x, out, np.empty(m.window.shape[1]), s)
     return out

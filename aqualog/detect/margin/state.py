@@ -9,8 +9,8 @@ import numpy as np
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "COLUMNS", "COVARIATES", "FEATURES", "FULL_SPEEDS", "LOG_STEP", "NODES", "OUTPUTS", "ROWS", "Emissions", "Filter",
-    "FilterParams", "Inputs",
+    "COLUMNS", "COVARIATES", "FEATURES", "FULL_SPEEDS", "LOG_STEP", "NODES", "OUTPUTS", "ROWS", "TAIL", "Emissions",
+    "Filter", "FilterParams", "Inputs",
 ]  # fmt: skip
 
 LOG_STEP = 0.05
@@ -21,6 +21,7 @@ NODES: FloatArray = LOG_STEP * np.arange(-5.0, 17.0)
 FEATURES = ("drag", "slip_more", "slip_less", "shake_more", "shake_less")
 """Of 0.6 s, less what the same car showed on dry road: resistance, slip of the front axle less that of the rear on the
 side that deviates more and on the other one, log variance of both. [-]"""
+TAIL = 6.0  # degrees of freedom of Student's law: how rare what was not drawn is
 COVARIATES = 3  # 1, log of the speed, traction
 
 OUTPUTS = ("p_water", "p_near", "low", "q25", "median", "q75", "high", "contact", "shows", "v_full")
@@ -80,7 +81,6 @@ class FilterParams(NamedTuple):
     vague: float = 9.0  # variance of a slip that says nothing: thrice the scale
     keep_s: float = 0.8  # [s] memory of the evidence on the full speed
     most_u: float = 2.8  # [-] asinh of the traction over 0.02: beyond, no drive on snow was learnt from
-    tail: float = 6.0  # degrees of freedom: how rare what was not drawn is
 
 
 class Inputs(NamedTuple):
