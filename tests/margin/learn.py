@@ -2,7 +2,8 @@
 
     python -m tests.margin.learn --passes 5400 --one-side 4500 --drives 24 --keep /tmp/windows.npz
     python -m tests.margin.learn --same-roads    # kinds of road stay as the file has them
-    python -m tests.margin.learn --passes 0      # only water under one side is learnt, the rest stays
+    python -m tests.margin.learn --passes 0 --one-side 900 --others 360    # only snow under one side is learnt, and what
+                                                 # the rear axle shows of it and of water there; the rest stays
 
 Windows come from passes whose tyres are drawn by `passes.any_tyre`, from dry drives of the tuning pool, and from drives
 on snow, ice and gravel. What is compared with is learnt from the dry road before, by the filter itself, which is told
@@ -20,7 +21,7 @@ from aqualog.detect.detector import Scene
 from aqualog.detect.margin import emissions, state
 from aqualog.detect.margin.inputs import Reader
 from aqualog.detect.margin.recursion import scan
-from aqualog.detect.margin.state import FULL_SPEEDS, NODES, TAIL, Emissions, Filter, FilterParams, Inputs
+from aqualog.detect.margin.state import FULL_SPEEDS, NODES, REAR, TAIL, Emissions, Filter, FilterParams, Inputs
 from aqualog.detect.margin.watch import params
 from aqualog.features.stream import FeatureStream
 from aqualog.model.drawing import KMH, SCORING_POOL, TUNING_POOL, Drawing
@@ -52,7 +53,7 @@ _N, _Z = len(state.FEATURES), state.COVARIATES
 NEUTRAL = Emissions(
     np.zeros((1, NODES.size, _N, _Z)), np.tile(1e9 * np.eye(_N), (1, NODES.size, 1, 1)), np.ones((1, NODES.size)),
     np.zeros((1, NODES.size)), np.ones(1), np.full(FULL_SPEEDS.size, 1.0 / FULL_SPEEDS.size), np.zeros((2, _N, _Z)), np.tile(1e9 * np.eye(_N), (2, 1, 1)),
-    np.ones(2), np.array([0.0, 1.0]),
+    np.ones(2), np.array([0.0, 1.0]), np.zeros((0, len(REAR), _Z + _N)), np.zeros((0, len(REAR), len(REAR))),
 )  # fmt: skip
 
 
@@ -98,6 +99,25 @@ def kinds_of(x, z, rng, kinds=KINDS):
     return mean, S, share
 
 
+def rear_of(x, z, rear, kinds):
+    """Mean of what the rear axle shows by covariates and features, and covariance, of each kind of windows."""
+    mean, S, share = kinds
+    left = x - np.einsum("nc,kfc->knf", z, mean)
+    square = np.einsum("kni,kij,knj->kn", left, np.linalg.inv(S), left)
+    logs = np.log(share)[:, None] - 0.5 * np.linalg.slogdet(S)[1][:, None] - 0.5 * (TAIL + _N) * np.log1p(square / TAIL)
+    r, form, n = np.exp(logs - np.logaddexp.reduce(logs)), np.hstack([z, x]), rear.shape[1]
+    found, scatter = np.zeros((len(r), n, _Z + _N)), np.zeros((len(r), n, n))
+    for k, w in enumerate(r):
+        own = w
+        for _ in range(6):
+            fit = np.linalg.solve(form.T @ (own[:, None] * form) + np.eye(_Z + _N), form.T @ (own[:, None] * rear))
+            left = rear - form @ fit
+            C = left.T @ (own[:, None] * left) / w.sum() + LEAST * np.eye(n)
+            own = w * (TAIL + n) / (TAIL + np.einsum("ni,ij,nj->n", left, np.linalg.inv(C), left))
+        found[k], scatter[k] = fit.T, C
+    return found, scatter
+
+
 def _text(x):
     return f"{float(x):.4g}" if np.ndim(x) == 0 else "[" + ", ".join(_text(y) for y in x) + "]"
 
@@ -130,11 +150,12 @@ def windows(columns, vehicle, dt, *wet):
         is_wet = any(a - 0.1 <= k * p.dt < b + 1.0 for a, b in wet)
         now.kinds[:] = (0.0, 1.0) if is_wet else (1.0, 0.0)
         _, now = scan(p, NEUTRAL, now, Inputs(*(x[at] for x in inputs)))
-        traction = np.nanmean(np.nansum(now.window[:, 5:9], axis=1)) * 0.5
+        traction = np.nanmean(np.nansum(now.window[:, 6:10], axis=1)) * 0.5
         v = now.window[int(now.samples[1] - 1) % state.ROWS, 0]
-        x = now.x[0] if (now.x[1] < 1.0).all() and v > p.v_least else np.full(_N, np.nan)
+        x = now.x[0] if (now.x[1, :_N] < 1.0).all() and v > p.v_least else np.full(_N + len(REAR), np.nan)
         with np.errstate(invalid="ignore"):
-            rows.append((*x, 1.0, np.log(v / 30.0), np.arcsinh(traction / 0.02)))
+            rear = np.where(now.x[1, _N:] < 1.0, x[_N:], np.nan)
+            rows.append((*x[:_N], 1.0, np.log(v / 30.0), np.arcsinh(traction / 0.02), *rear))
     return np.array(rows)
 
 
@@ -164,30 +185,37 @@ def of_drives(first, number):
         yield from ((DRIVETRAINS.index(drawn.believed.drivetrain), 0, 0, np.nan, np.nan, *row) for row in x[30::5])
 
 
+def other_drive(seed, drivetrain, one_side=False):
+    """Signals, the vehicle, and since when [s], of a minute partly on snow, ice or gravel of laws drawn far wider than
+    sources have them. `one_side`: with asphalt under the other side."""
+    rng = np.random.default_rng([seed, 80])
+    pool = (SCORING_POOL, TUNING_POOL)[int(rng.integers(2))]
+    car = next(c for c in pool.vehicles if c.drivetrain == drivetrain)
+    tyre = pool.tyres[int(rng.integers(len(pool.tyres)))]
+    k = Drawing(rng, pool, car, tyre, rng.uniform(1.8e5, 2.8e5), int(rng.integers(2**31)))
+    compliance, mu = k.one_of(0.0, *[0.01 * 12.5 ** rng.uniform()] * 6), 0.06 * 12.0 ** rng.uniform()
+    other = Surface("other", mu, compliance, 0.05 * rng.uniform() ** 2, k.between(0.0, 70.0))
+    split = (other, SURFACES["asphalt"]), (SURFACES["asphalt"], other)
+    left, right = k.one_of(*[(other, other)] * 6 * (not one_side), *split)
+    start, v = k.one_of(0.0, k.between(10.0, 20.0)), k.between(42.0, 110.0) * KMH
+    speed = k.cruise(60.0, v, spread=k.between(0.02, 0.15), a_most=0.4)
+    drive = k.drive(60.0, speed, lanes=(Lane(start, 90.0, surface=left, surface_right=right),))
+    believed = believed_vehicle(drive, rng)
+    return as_signals(simulate(drive), vehicle=believed), believed, start or k.between(1.0, 4.0)
+
+
 def of_others(first, number, one_side=False):
-    """The same of minutes partly on snow, ice or gravel of laws drawn far wider than sources have them, where wheels
-    grip: one that spins is no matter of the margin. `one_side`: all with asphalt under the other side.
+    """The same of minutes on other surfaces, where wheels grip: one that spins is no matter of the margin. `one_side`:
+    spinning ones too, for there the rear axle shows what they spin on.
     """
     for n in range(number):
-        rng = np.random.default_rng([first + n, 80])
-        pool = (SCORING_POOL, TUNING_POOL)[int(rng.integers(2))]
-        car = next(c for c in pool.vehicles if c.drivetrain == DRIVETRAINS[n % 3])
-        tyre = pool.tyres[int(rng.integers(len(pool.tyres)))]
-        k = Drawing(rng, pool, car, tyre, rng.uniform(1.8e5, 2.8e5), int(rng.integers(2**31)))
-        compliance, mu = k.one_of(0.0, *[0.01 * 12.5 ** rng.uniform()] * 6), 0.06 * 12.0 ** rng.uniform()
-        other = Surface("other", mu, compliance, 0.05 * rng.uniform() ** 2, k.between(0.0, 70.0))
-        split = (other, SURFACES["asphalt"]), (SURFACES["asphalt"], other)
-        left, right = k.one_of(*[(other, other)] * 6 * (not one_side), *split)
-        start, v = k.one_of(0.0, k.between(10.0, 20.0)), k.between(42.0, 110.0) * KMH
-        speed = k.cruise(60.0, v, spread=k.between(0.02, 0.15), a_most=0.4)
-        drive = k.drive(60.0, speed, lanes=(Lane(start, 90.0, surface=left, surface_right=right),))
-        believed = believed_vehicle(drive, rng)
-        signals = as_signals(simulate(drive), vehicle=believed)
-        start = start or k.between(1.0, 4.0)  # who starts on snow takes seconds of it for dry road
+        # who starts on snow takes seconds of it for dry road
+        signals, believed, start = other_drive(first + n, DRIVETRAINS[n % 3], one_side)
         x = windows({s: signals.array(s) for s in signals.symbols}, believed, signals.dt_ns * 1e-9, (start, 90.0))
         x = x[round(start / 0.1) + 5 :: 5]
         law = ONE_SIDE if one_side else 0
-        yield from ((n % 3, OTHER, law, np.nan, np.nan, *row) for row in x if not (np.abs(row[1:3]) > GRIPS).any())
+        few = x[one_side | ~(np.abs(x[:, 1:3]) > GRIPS).any(axis=1)]
+        yield from ((n % 3, OTHER, law, np.nan, np.nan, *row) for row in few)
 
 
 def prior(rng, n=4000):
@@ -220,8 +248,11 @@ def of_law(rows):
 
 
 def learn(found, kept=()):
-    """Emissions by drivetrain from rows of windows; `kept` of the file at hand: "distances" and "roads"."""
-    found = found[np.isfinite(found[:, 5:]).all(axis=1)]
+    """Emissions by drivetrain from rows of windows; `kept` of the file at hand: "distances" and "roads".
+
+    Distances, and kinds of water under one side, stay together.
+    """
+    found = found[np.isfinite(found[:, 5 : 5 + _N + _Z]).all(axis=1)]
     before, tables = prior(np.random.default_rng(5)), {}
     shares = 0.5 * np.repeat([*((1.0 - SHARE_ONE) * np.array(SHARES)), SHARE_ONE], 2)
     for d, drivetrain in enumerate(DRIVETRAINS):
@@ -231,24 +262,29 @@ def learn(found, kept=()):
         is_wet = (road > 0) & (road < OTHER) & (ratio < WET)
         # what slips on snow slips in proportion to the traction; means of water that did so warned on a measured road
         roads = ((road == 0, 1), (is_wet & (law != ONE_SIDE), 1), ((road == OTHER) & (law != ONE_SIDE), _Z))
-        one = (is_wet & (law == ONE_SIDE), 1), ((road == OTHER) & (law == ONE_SIDE), _Z)
-        both = 2 * len(LAWS)
-        distances = [
-            *(zip(*(t[:both] for t in file[:4]), strict=True) if "distances" in kept else
-              (way for k in range(len(LAWS)) for way in of_law(own[(road == 1) & (law == k)]))),
-            *of_law(own[(road == 1) & (law == ONE_SIDE)]),
-        ]  # fmt: skip
+        water, snow = is_wet & (law == ONE_SIDE), (road == OTHER) & (law == ONE_SIDE)
+        distances = zip(*file[:4], strict=True) if "distances" in kept else (
+            way for k in range(len(LAWS) + 1) for way in of_law(own[(road == 1) & (law == k)])
+        )  # fmt: skip
+        of_water, of_snow = slice(3 * KINDS, 3 * KINDS + KINDS_ONE), slice(3 * KINDS + KINDS_ONE, None)
         m, S, share = (np.concatenate(k) for k in zip(
             *([[t[: 3 * KINDS] for t in file[6:9]]] if "roads" in kept else
               [kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]),
-            *(kinds_of(x[some, :_N], x[some, _N : _N + used], rng, KINDS_ONE) for some, used in one), strict=True,
+            [t[of_water] for t in file[6:9]] if "distances" in kept else
+            kinds_of(x[water, :_N], x[water, _N : _N + 1], rng, KINDS_ONE),
+            kinds_of(x[snow, :_N], x[snow, _N : _N + _Z], rng, KINDS_ONE), strict=True,
         ))  # fmt: skip
+        known = np.isfinite(x).all(axis=1)
+        rear = zip(*(
+            rear_of(*np.split(x[some & known], (_N, _N + _Z), axis=1), (m[k], S[k], share[k]))
+            for some, k in ((water, of_water), (snow, of_snow))
+        ), strict=True)  # fmt: skip
         of = np.repeat([0.0, 1.0, 2.0, 1.0, 3.0], [*[KINDS] * 3, *[KINDS_ONE] * 2])
         is_one = np.arange(of.size) >= 3 * KINDS
         for some, whole in (((of == 1.0) & ~is_one, 1.0 - SHARE_ONE), ((of == 1.0) & is_one, SHARE_ONE)):
             share[some] *= whole / share[some].sum()
         by_law = (np.array(each) for each in zip(*distances, strict=True))
-        tables[drivetrain] = Emissions(*by_law, shares, before, m, S, share, of)
+        tables[drivetrain] = Emissions(*by_law, shares, before, m, S, share, of, *map(np.concatenate, rear))
     return tables, len(found)
 
 
@@ -263,7 +299,7 @@ def main():
     if not a.keep.exists():
         roads = () if kept else (*of_drives(a.first, a.drives), *of_others(a.first, a.others))
         wet = *of_passes(a.first, a.passes), *of_passes(a.first, a.one_side, one_side=True)
-        np.savez(a.keep, x=np.array((*wet, *roads, *of_others(a.first, a.one_side // 10, one_side=True))))
+        np.savez(a.keep, x=np.array((*wet, *roads, *of_others(a.first, a.others, one_side=True))))
     tables, n = learn(np.load(a.keep)["x"], kept)
     before = f", {' and '.join(kept)} of before" if kept else ""
     note = f"Made by `python -m tests.margin.learn` from {n:,} windows{before}."

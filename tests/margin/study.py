@@ -3,6 +3,7 @@
 python -m tests.margin.study --passes 4000 --first 20000
 python -m tests.margin.study --passes 1000 --first 20000 --foreign     # tests.blind.multibody: other laws
 python -m tests.margin.study --passes 1000 --first 20000 --any-law     # the same, with laws drawn from published forms
+python -m tests.margin.study --snow 120 --first 1620000                # drives on snow under one side: which warn
 python -m tests.margin.study --campaigns 100 --first 70000             # of 8 runs, the fastest 15 km/h below it
 """
 
@@ -14,8 +15,8 @@ import numpy as np
 from aqualog.campaign import full_speed
 from aqualog.campaign.spin_downs import SETTLED_S, Pass, _foretold
 from aqualog.detect.margin.watch import MARGIN
-from aqualog.detect.stream import DriveStream
-from tests.margin.learn import DRIVETRAINS
+from aqualog.detect.stream import DriveStream, detect_drive
+from tests.margin.learn import DRIVETRAINS, other_drive
 from tests.margin.passes import AGAIN, foreign_pass, own_pass
 
 KMH = 3.6
@@ -70,10 +71,16 @@ def main():
     parser.add_argument("--any-law", action="store_true")
     parser.add_argument("--passes", type=int, default=600)
     parser.add_argument("--first", type=int, default=20_000)
-    parser.add_argument("--campaigns", type=int, default=0)
+    for name in ("campaigns", "snow"):
+        parser.add_argument(f"--{name}", type=int, default=0)
     a = parser.parse_args()
     other = partial(foreign_pass, any_law=a.any_law)
     make, seeds = other if a.foreign or a.any_law else own_pass, range(a.first, a.first + a.passes)
+    if a.snow:
+        drives = [other_drive(a.first + n, DRIVETRAINS[n % 3], one_side=True)[:2] for n in range(a.snow)]
+        warned = [any(e.detector == "margin" for e in detect_drive(*drive).events) for drive in drives]
+        print(f"{a.snow} drives, warned {sum(warned)}, by {DRIVETRAINS}: {[sum(warned[i::3]) for i in range(3)]}")
+        return
     if a.campaigns:
         x = np.array([foretold(make, seed) for seed in range(a.first, a.first + a.campaigns)])
         true, v, low, high = x[np.isfinite(x[:, 1])].T

@@ -25,7 +25,7 @@ from aqualog.report.drive.document import document
 from aqualog.report.drive.panels import drive_rows
 from aqualog.report.drive.report import drive_report
 from tests.drives import CAR, FWD, drive, lane
-from tests.margin.learn import DRIVETRAINS, inputs_of, windows
+from tests.margin.learn import DRIVETRAINS, inputs_of, other_drive, windows
 from tests.margin.passes import LAWS, any_tyre, own_full, own_pass
 from tests.margin.study import outcome
 
@@ -58,7 +58,7 @@ def test_emissions_are_a_law(drivetrain):
     assert (np.linalg.eigvalsh(np.concatenate([*t.scatter, t.kind_scatter])) > 0.0).all()
     assert (t.prior.sum(), t.law.sum()) == pytest.approx((1.0, 1.0), abs=1e-3)
     p = params(CAR, 0.1)
-    standing = Inputs(*np.zeros((10, 300_000)))
+    standing = Inputs(*np.zeros((len(Inputs._fields), 300_000)))
     assert scan(p, t, Filter.new(p, t), standing)[1].kinds.sum() == pytest.approx(1.0, abs=1e-6)
 
 
@@ -79,7 +79,7 @@ def test_emissions_are_those_of_these_features(drivetrain):
         x = windows(p.columns, p.vehicle, p.dt, p.wet)[round((p.wet[0] + 2.0) / 0.1)]
         node = int(np.argmin(np.abs(np.log(p.v_full / 30.0) - x[6] - NODES)))
         way = int(x[1] < 0.0)  # of the usual law
-        left = x[:5] - t.mean[way, node] @ x[5:]
+        left = x[:5] - t.mean[way, node] @ x[5:8]
         squares.append(left @ np.linalg.solve(t.scatter[way, node], left))
     assert np.nanmedian(squares) < CHI2_95
 
@@ -231,6 +231,24 @@ def test_water_under_one_side_of_a_car_with_front_wheel_drive(seed):
     assert abs(median - true) < 15.0
     assert warned
     assert not early
+
+
+@pytest.mark.parametrize("seed", [1611000, 1611021, 1611039])
+def test_snow_under_one_side_is_no_water(seed):
+    """Wheels of the rear axle spin and shake on it as the front ones do."""
+    signals, car, _ = other_drive(seed, DRIVETRAINS[seed % 1000 % 3], one_side=True)
+    assert not [e for e in detect_drive(signals, car).events if e.detector == "margin"]
+
+
+@pytest.mark.parametrize("drivetrain", DRIVETRAINS)
+def test_the_rear_axle_shows_what_lies_under_one_side(drivetrain):
+    """It slips and shakes less in water than on snow, where the front axle shows the same."""
+    t = emissions_of(drivetrain)
+    x = np.concatenate([(1.0, 0.0, np.arcsinh(5.0)), (0.7, -3.0 if drivetrain != "fwd" else 3.0, 0.0, 4.0, 0.0)])
+    of = len(t.rear)
+    water, snow = (np.average(t.rear @ x, axis=0, weights=t.kind_prior[-of:] * (t.road[-of:] == k)) for k in (1, 3))
+    assert snow[1] > water[1] + 1.0
+    assert abs(snow[0]) > abs(water[0]) + 0.3 or drivetrain == "rwd"  # its torque slips there
 
 
 def rough(seed=3):

@@ -17,7 +17,7 @@ from aqualog.detect.margin.state import Emissions
 
 __all__ = ["emissions_of"]
 
-VERSION = 3
+VERSION = 4
 
 
 @lru_cache(maxsize=3)

@@ -15,6 +15,7 @@ from aqualog.physics.load import wheel_loads
 
 __all__ = ["Reader"]
 
+PAIRS = ((0, 2), (1, 3), (2, 3))  # of `WHEELS`: front and rear of each side, both sides of the rear axle
 V_MIN = 5.0  # [m/s] slower, wheel speeds are too coarse
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering costs more than the balance knows
 TAU_A = 0.5  # [s] of the acceleration that these limits are for, about the window's length
@@ -54,16 +55,16 @@ class Reader:
             rolls = (v > V_MIN) & ~scene.is_braking & ~jump
             trusted = rolls & (a < A_MOST) & (a > A_LEAST) & ~(np.abs(f["a_y_slow"]) > A_Y_MAX)
         R = np.where(trusted, f["delta_a_x"], np.nan)
-        sides = []
-        for i, side in enumerate("lr"):
-            front, rear = (self._turning(scene, f"{axle}{side}") for axle in "fr")
+        turning, pairs = [self._turning(scene, w) for w in WHEELS], []
+        for one, other in PAIRS:
+            front, rear = turning[one], turning[other]
             with np.errstate(invalid="ignore", divide="ignore"):
                 slip = none if front is None or rear is None else (front - rear) / v
-                small = np.maximum(np.abs(u[i]), np.abs(u[2 + i])) < U_MAX
-            sides.append(np.where(trusted & small, slip, np.nan))
+                small = np.maximum(np.abs(u[one]), np.abs(u[other])) < U_MAX
+            pairs.append(np.where(trusted & small, slip, np.nan))
         # of the torques, not the accelerometer: that is in the resistance too, and its noise would make a slope of them
         torques = f["delta_a_x"] + scene.columns["a_x"]
-        return Inputs._make((v, torques, R, *sides, *u, scene.columns["a_x"]))
+        return Inputs._make((v, torques, R, *pairs, *u, scene.columns["a_x"]))
 
     def _turning(self, scene: Scene, wheel: str) -> FloatArray | None:
         """Speed of a wheel on the centre line, NaN where its signal stands still. [m/s]"""

@@ -39,7 +39,8 @@ _SURE = 1.645  # standard deviations of a quantile of 95 %
 _STILL = 0.25  # variance of what wheels shake that shake as on dry road, of 0.6 s in log variance
 _NEVER, _FAINT = -40.0, 1e-12  # of an evidence: below the best, and itself
 _UNKNOWN = 1e4  # variance of a feature that is missing
-_V, _A, _R, _D, _U_F, _U_R, _B, _VAR, _VAR_B, _S_F, _S_R = 0, 1, 2, 3, 5, 7, 9, 10, 12, 13, 15  # columns of a step
+_V, _A, _R, _D, _U_F, _U_R, _B, _VAR, _VAR_B, _S_F, _S_R = 0, 1, 2, 3, 6, 8, 10, 11, 14, 15, 17  # columns of a step
+_SLIP, _SHAKE = (1, 2, 5), (3, 4, 6)  # places among the features of two sides and the rear axle
 _NI = len(Inputs._fields)
 _LEAST, _LEAST_B = 1e-10, 1e-5  # of a slip's variance, and of the accelerometer's [(m/s^2)^2]
 _LEAST_S = 1e-9  # of a feature's variance that the others leave
@@ -81,6 +82,12 @@ def _drag(g, a, v2):  # type: ignore[no-untyped-def]
 
 
 @part
+def _pair(row, i):  # type: ignore[no-untyped-def]
+    """Slips of dry wheels that are compared: front and rear of a side, or left and right of the rear axle."""
+    return (row[_S_F + i], row[_S_R + i]) if i < 2 else (row[_S_R], row[_S_R + 1])
+
+
+@part
 def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
     """Learn what the car shows on dry road from the step that has just left the window."""
     g = m.R
@@ -94,11 +101,11 @@ def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
             g[0, i] += share * gain[i] * left
             for j in range(3):
                 g[1 + i, j] -= share * gain[i] * gain[j]
-    for i in range(2):
+    for i in range(3):
         g = m.sides[i]
         g[2] = min(g[2] + p.walk_D**2 * p.dt, p.offset_D**2)
         g[4] = min(g[4] + p.walk_share**2 * p.dt, p.share_D**2)
-        front, rear = row[_S_F + i], row[_S_R + i]
+        front, rear = _pair(row, i)
         if math.isnan(row[_D + i] + front + rear):
             continue
         away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
@@ -151,25 +158,25 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
     shock = _shake_of_body(m)
     rough = 0.0 if math.isnan(shock) else max(shock - m.body[0], 0.0)
     m.body[2] = rough
-    for i in range(2):
-        g = m.sides[i]
+    for i in range(3):
+        g, slip, shake = m.sides[i], _SLIP[i], _SHAKE[i]
         n, e, e2, h, within = 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(ROWS):
             row = m.window[k]
-            front, rear = row[_S_F + i], row[_S_R + i]
+            front, rear = _pair(row, i)
             if math.isnan(row[_D + i] + front + rear):
                 continue
             away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
             n, e, e2, h, within = n + 1.0, e + away, e2 + away * away, h + front + rear, within + row[_VAR + i]
-        x[1 + i], P[1 + i], x[3 + i], P[3 + i] = 0.0, _UNKNOWN, 0.0, _UNKNOWN
+        x[slip], P[slip], x[shake], P[shake] = 0.0, _UNKNOWN, 0.0, _UNKNOWN
         if n >= 3.0:
             e, h = e / n, h / n
-            x[1 + i] = math.asinh(e / p.scale_D)
-            x[3 + i] = math.log(max(e2 / n - e * e, 0.0) + within / n + _LEAST) - g[5]
-            P[3 + i] = g[6] + rough * rough
+            x[slip] = math.asinh(e / p.scale_D)
+            x[shake] = math.log(max(e2 / n - e * e, 0.0) + within / n + _LEAST) - g[5]
+            P[shake] = g[6] + rough * rough
             # what shakes on dry road leaves the mean of few samples unsure; a slip within twice of that is none
-            noise = math.exp(g[5] + max(min(rough, x[3 + i]), 0.0)) / (n * p.block)
-            P[1 + i] = (g[2] + 2.0 * h * g[3] + h * h * g[4] + noise) / (p.scale_D**2 + max(e * e - 4.0 * noise, 0.0))
+            noise = math.exp(g[5] + max(min(rough, x[shake]), 0.0)) / (n * p.block)
+            P[slip] = (g[2] + 2.0 * h * g[3] + h * h * g[4] + noise) / (p.scale_D**2 + max(e * e - 4.0 * noise, 0.0))
     more = 1 if P[1] >= _UNKNOWN or (P[2] < _UNKNOWN and abs(x[2]) > abs(x[1])) else 0
     return traction / max(steps, 1.0), more
 
@@ -271,9 +278,35 @@ def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
 
 
 @part
+def _compare_rear(p, t, m, z, score):  # type: ignore[no-untyped-def]
+    """Let the rear axle say what lies under one side: its wheel runs in water that the front wheel has cleared, and
+    slips and shakes less than that. Snow does the same to both."""
+    x, P = m.x[0], m.x[1]
+    first, before, after, best = score.size - t.rear.shape[0], 0.0, 0.0, -1e300
+    for k in range(first, score.size):
+        r, C = t.rear[k - first], t.rear_scatter[k - first]
+        y0, y1 = x[5], x[6]
+        for c in range(COVARIATES):
+            y0, y1 = y0 - r[0, c] * z[c], y1 - r[1, c] * z[c]
+        for c in range(_NX):
+            y0, y1 = y0 - r[0, COVARIATES + c] * x[c], y1 - r[1, COVARIATES + c] * x[c]
+        d, determinant, square = _count(C[0, 0] + P[5], y0, 1.0, 0.0)
+        a = C[0, 1] * d
+        _, determinant, square = _count(C[1, 1] + P[6] - a * C[0, 1], y1 - a * y0, determinant, square)
+        score[k] = -p.weight * (0.5 * math.log(determinant) + (0.5 * TAIL + 1.0) * math.log1p(square / TAIL))
+        best = max(best, score[k])
+        before += m.kinds[k]
+    for k in range(first, score.size):
+        m.kinds[k] *= math.exp(score[k] - best)
+        after += m.kinds[k]
+    for k in range(first, score.size):
+        m.kinds[k] *= before / after
+
+
+@part
 def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
     """Let the window speak: probabilities of the kinds of road, evidence on the full speeds."""
-    z, known, P, score, nodes, _, even, at, above = s
+    z, known, P, score, nodes, _, even, at, above, _ = s
     z[0], z[1], z[2] = 1.0, math.log(v / 30.0), math.asinh(traction / 0.02)
     known[0], known[1], known[2] = 1.0, z[1], min(z[2], p.most_u)
     for k in range(score.size):
@@ -289,6 +322,7 @@ def _judge(p, t, m, v, traction, s):  # type: ignore[no-untyped-def]
         total += m.kinds[k]
     for k in range(score.size):
         m.kinds[k] /= total
+    _compare_rear(p, t, m, known, score)
     keep, heard = math.exp(-p.dt / p.keep_s), _is(t, m, 1) > p.heard
     for law in range(t.law.size):
         for i in range(_NV):
@@ -316,12 +350,14 @@ def _predict(p, t, m):  # type: ignore[no-untyped-def]
     """Let the kinds change into each other over one step."""
     now = (_is(t, m, 0), _is(t, m, 1), _is(t, m, 2), _is(t, m, 3))
     change, ends = p.among * p.dt, p.dt * (p.to_dry + p.mistaken)
-    out = (p.dt * (p.to_water + p.to_other + p.to_side), ends, ends, ends)
+    # what lies under both sides may end under one of them, and begin
+    leaves = ends + p.dt * p.sides
+    out = (p.dt * (p.to_water + p.to_other + p.to_side), ends, leaves, leaves)
     into = (
         p.dt * p.to_dry * (now[1] + now[2] + now[3]),
         p.dt * (p.to_water * now[0] + p.mistaken * (now[2] + now[3])),
-        p.dt * (p.to_other * now[0] + 0.5 * p.mistaken * now[1]),
-        p.dt * (p.to_side * now[0] + 0.5 * p.mistaken * now[1]),
+        p.dt * (p.to_other * now[0] + 0.5 * p.mistaken * now[1] + p.sides * now[3]),
+        p.dt * (p.to_side * now[0] + 0.5 * p.mistaken * now[1] + p.sides * now[2]),
     )
     for k in range(m.kinds.size):
         road = int(t.road[k])
@@ -389,10 +425,11 @@ def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
     traction, more = _gather(p, m)
     speed = max(v, p.v_least)
     x, P = m.x[0], m.x[1]
-    own = (
-        x[3] + m.sides[0, 5] if P[3] < _UNKNOWN else math.nan, x[4] + m.sides[1, 5] if P[4] < _UNKNOWN else math.nan,
-    )  # fmt: skip
+    own = s[9]
+    for i in range(3):
+        own[i] = x[_SHAKE[i]] + m.sides[i, 5] if P[_SHAKE[i]] < _UNKNOWN else math.nan
     if more == 1:
+        x[5] = -x[5]
         for a in (1, 3):
             x[a], x[a + 1] = x[a + 1], x[a]
             P[a], P[a + 1] = P[a + 1], P[a]
@@ -400,7 +437,7 @@ def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
     if v > p.v_least:
         _judge(p, t, m, speed, traction, s)
     wet, dry = _is(t, m, 1), _is(t, m, 0)
-    for i in range(2):
+    for i in range(3):
         _learn_shake(p, m.sides[i, 5:], own[i], dry)
     _learn_shake(p, m.body, _shake_of_body(m), dry)
     near = 0.0
@@ -426,7 +463,7 @@ def _push(p, t, m, x, out, row, s):  # type: ignore[no-untyped-def]
             for c in range(_NI):
                 enough = m.sums[1, c] > 0.0 and m.sums[1, c] >= 0.5 * p.block
                 row[c] = m.sums[0, c] / m.sums[1, c] if enough else math.nan
-            for at, c in ((_VAR, _D), (_VAR + 1, _D + 1), (_VAR_B, _B)):
+            for at, c in ((_VAR, _D), (_VAR + 1, _D + 1), (_VAR + 2, _D + 2), (_VAR_B, _B)):
                 row[at] = max(m.sums[2, c] / max(m.sums[1, c], 1.0) - row[c] * row[c], 0.0)
             m.sums[:] = 0.0
             m.samples[0] = 0.0
@@ -446,6 +483,7 @@ def _scan(p, t, m, x):  # type: ignore[no-untyped-def]
     s = (
         np.empty(COVARIATES), np.empty(COVARIATES), np.empty(_NX), np.empty(kinds), np.empty(nodes),
         np.empty((t.law.size, _NV)), np.empty(max(kinds, nodes)), np.empty(_NV, np.int64), np.empty(_NV),
+        np.empty(3),
     )  # fmt: skip
     _push(p, t, m, x, out, np.empty(m.window.shape[1]), s)
     return out

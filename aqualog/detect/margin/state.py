@@ -9,8 +9,8 @@ import numpy as np
 from aqualog.core.records import FloatArray
 
 __all__ = [
-    "COLUMNS", "COVARIATES", "FEATURES", "FULL_SPEEDS", "LOG_STEP", "NODES", "OUTPUTS", "ROWS", "TAIL", "Emissions",
-    "Filter", "FilterParams", "Inputs",
+    "COLUMNS", "COVARIATES", "FEATURES", "FULL_SPEEDS", "LOG_STEP", "NODES", "OUTPUTS", "REAR", "ROWS", "TAIL",
+    "Emissions", "Filter", "FilterParams", "Inputs",
 ]  # fmt: skip
 
 LOG_STEP = 0.05
@@ -21,6 +21,8 @@ NODES: FloatArray = LOG_STEP * np.arange(-5.0, 17.0)
 FEATURES = ("drag", "slip_more", "slip_less", "shake_more", "shake_less")
 """Of 0.6 s, less what the same car showed on dry road: resistance, slip of the front axle less that of the rear on the
 side that deviates more and on the other one, log variance of both. [-]"""
+REAR = ("rear", "rear_shake")
+"""The same of the rear axle alone: slip of the side that deviates more less that of the other one, log variance. [-]"""
 TAIL = 6.0  # degrees of freedom of Student's law: how rare what was not drawn is
 COVARIATES = 3  # 1, log of the speed, traction
 
@@ -28,7 +30,7 @@ OUTPUTS = ("p_water", "p_near", "low", "q25", "median", "q75", "high", "contact"
 """Rows of what a scan returns: probabilities [-], quantiles of the distance [m/s], contact share [-], whether
 drag, shake or the slip of both sides is more than that of the dry road (1 or 0), speed [m/s]."""
 ROWS = 6  # steps of the window
-COLUMNS = 17  # means of a step: inputs, variances of slips and specific force, the slips of dry wheels by the traction
+COLUMNS = 19  # means of a step: inputs, variances of slips and specific force, the slips of dry wheels by the traction
 
 
 class FilterParams(NamedTuple):
@@ -66,6 +68,7 @@ class FilterParams(NamedTuple):
     to_side: float = 1.0 / 900.0  # the same under one side alone: as often as water there (K)
     to_dry: float = 1.0 / 10.0
     mistaken: float = 1.0 / 100.0  # of water to another surface and back
+    sides: float = 1.0 / 20.0  # of snow under both sides to snow under one, and back (K)
     among: float = 1.0 / 5.0  # of one kind of dry or wet road to another
     start: tuple[float, float, float, float] = (0.955, 0.02, 0.02, 0.005)  # of roads; with 0.15 wet trailers were rain
     drags: float = 0.05  # [m/s^2] that water near full aquaplaning takes at least
@@ -85,7 +88,7 @@ class FilterParams(NamedTuple):
 
 class Inputs(NamedTuple):
     """Arrays (n,): speed [m/s]; acceleration that the torques make on a level dry road and resistance [m/s²]; of sides
-    slip front less rear; traction [-]; specific force along the car [m/s²].
+    slip front less rear; of the rear axle left less right; traction [-]; specific force along the car [m/s²].
 
     NaN where a value is unknown or not to be trusted.
     """
@@ -95,6 +98,7 @@ class Inputs(NamedTuple):
     R: FloatArray
     D_l: FloatArray
     D_r: FloatArray
+    D_rear: FloatArray
     u_fl: FloatArray
     u_fr: FloatArray
     u_rl: FloatArray
@@ -108,7 +112,8 @@ class Emissions(NamedTuple):
 
     `contact` (laws, nodes) [-] of the front axle; `ways` (laws, nodes) log share of those wheels; `prior` (full
     speeds,). `kind_` the same of kinds of road: `road` 0 dry, 1 wet, 2 snow, ice or gravel, 3 these under
-    one side alone; shares of each sum to 1.
+    one side alone; shares of each sum to 1. `rear` (last kinds, rear features, covariates and features) is the mean of
+    what the rear axle shows, `rear_scatter` its covariance: of those under one side alone, which are the last.
     """
 
     mean: FloatArray
@@ -121,6 +126,8 @@ class Emissions(NamedTuple):
     kind_scatter: FloatArray
     kind_prior: FloatArray
     road: FloatArray
+    rear: FloatArray
+    rear_scatter: FloatArray
 
     def in_columns(self) -> Emissions:
         """Return the same with laws and nodes as one last index, and kinds as the last one."""
@@ -134,8 +141,8 @@ class Filter(NamedTuple):
 
     `R` (4, 3): offset of the resistance [m/s²], its share of what the torques make (an unknown load or trailer), what
     the air adds at `pace` [m/s²], and their covariance.
-    `sides` (2, 7): offset of the slip, share of the axles' slips that it is off by, covariance, log variance and its
-    variance.
+    `sides` (3, 7), the third of the rear axle: offset of the slip, share of the axles' slips that it is off by,
+    covariance, log variance and its variance.
     """
 
     evidence: FloatArray  # (laws, full speeds) log
@@ -146,7 +153,7 @@ class Filter(NamedTuple):
     window: FloatArray  # (ROWS, COLUMNS)
     sums: FloatArray  # (3, inputs) sums, counts and sums of squares of the running step
     samples: FloatArray  # (3,) of the running step; steps so far; variance of their resistance [(m/s²)²]
-    x: FloatArray  # (2, features) of the last window, and variances of what they are compared with
+    x: FloatArray  # (2, features and rear ones) of the last window, and variances of what they are compared with
     out: FloatArray  # (len(OUTPUTS),)
 
     @staticmethod
@@ -157,12 +164,12 @@ class Filter(NamedTuple):
             evidence=np.zeros((t.law.size, FULL_SPEEDS.size)),
             kinds=t.kind_prior * np.array(p.start)[t.road.astype(int)],
             R=np.vstack([np.zeros(3), np.diag([p.offset_R**2, p.share_a**2, p.area**2])]),
-            sides=np.stack([side, side]),
+            sides=np.stack([side, side, side]),
             body=np.array([p.shock, p.offset_M**2, 0.0]),
             window=np.full((ROWS, COLUMNS), np.nan),
             sums=np.zeros((3, len(Inputs._fields))),
             samples=np.zeros(3),
-            x=np.full((2, len(FEATURES)), np.nan),
+            x=np.full((2, len(FEATURES) + len(REAR)), np.nan),
             out=np.full(len(OUTPUTS), np.nan),
         )
 
