@@ -259,25 +259,6 @@ def _is(t, m, road):  # type: ignore[no-untyped-def]
 
 
 @part
-def _weights(p, t, m, v, w):  # type: ignore[no-untyped-def]
-    """Fill the probabilities of laws and full speeds (laws, full speeds), given that there is water."""
-    best, total = -1e300, 0.0
-    for i in range(_NV):
-        beyond = max(v - FULL_SPEEDS[i], 0.0) / p.brave
-        for law in range(t.law.size):
-            w[law, i] = m.evidence[law, i] - 0.5 * beyond * beyond
-            best = max(best, w[law, i])
-    for law in range(t.law.size):
-        for i in range(_NV):
-            away = w[law, i] - best
-            w[law, i] = t.law[law] * t.prior[i] * math.exp(away) if away > _NEVER else 0.0
-            total += w[law, i]
-    for law in range(t.law.size):
-        for i in range(_NV):
-            w[law, i] /= total
-
-
-@part
 def _compare_rear(p, t, m, z, score):  # type: ignore[no-untyped-def]
     """Let the rear axle say what lies under one side: its wheel runs in water that the front wheel has cleared, and
     slips and shakes less than that. Snow does the same to both."""
@@ -367,15 +348,28 @@ def _predict(p, t, m):  # type: ignore[no-untyped-def]
 
 @part
 def _distance(p, t, m, v, s):  # type: ignore[no-untyped-def]
-    """Fill the quantiles of the distance, and contact; return the probability that full aquaplaning is near."""
+    """Fill the quantiles of the distance, and contact, given that there is water; return the probability that full
+    aquaplaning is near."""
     w, at, above = s[5], s[7], s[8]
+    best, whole = -1e300, 0.0
+    for i in range(_NV):
+        beyond = max(v - FULL_SPEEDS[i], 0.0) / p.brave
+        for law in range(t.law.size):
+            w[law, i] = m.evidence[law, i] - 0.5 * beyond * beyond
+            best = max(best, w[law, i])
+    for law in range(t.law.size):
+        for i in range(_NV):
+            away = w[law, i] - best
+            w[law, i] = t.law[law] * t.prior[i] * math.exp(away) if away > _NEVER else 0.0
+            whole += w[law, i]
+    v = abs(v)  # from the car's own speed
     near, total, q, L = 0.0, 0.0, 0, 0.0
     edge, limit = _LOG[0] - 0.5 * LOG_STEP, math.log(v + p.near)
     for i in range(_NV):
         here = 0.0
         for law in range(t.law.size):
-            here += w[law, i]
-            L += w[law, i] * ((1.0 - above[i]) * t.contact[law, at[i]] + above[i] * t.contact[law, at[i] + 1])
+            here += w[law, i] / whole
+            L += w[law, i] / whole * ((1.0 - above[i]) * t.contact[law, at[i]] + above[i] * t.contact[law, at[i] + 1])
         near += here * min(max((limit - edge) / LOG_STEP, 0.0), 1.0)
         while q < 5 and total + here >= _QUANTILES[q] and here > 0.0:
             m.out[2 + q] = math.exp(edge + LOG_STEP * (_QUANTILES[q] - total) / here) - v
@@ -440,12 +434,8 @@ def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
     for i in range(3):
         _learn_shake(p, m.sides[i, 5:], own[i], dry)
     _learn_shake(p, m.body, _shake_of_body(m), dry)
-    near = 0.0
     m.out[:] = math.nan
-    if wet > p.heard:
-        _weights(p, t, m, speed, s[5])
-        near = _distance(p, t, m, abs(v), s)  # from the car's own speed
-    _fill(p, m, wet, near)
+    _fill(p, m, wet, _distance(p, t, m, v, s) if wet > p.heard else 0.0)
 
 
 @part
