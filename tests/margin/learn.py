@@ -57,23 +57,33 @@ NEUTRAL = Emissions(
 )  # fmt: skip
 
 
-def laws_of(x, z, where, share):
-    """Mean by covariates and covariance at each node, where the log speed ratio (n,) is: regression by Student's law.
+def regression(form, x, share, ridge=LEAST):
+    """Coefficients of x on `form`, and covariance, by Student's law; `share` (n,): how much each window counts."""
+    w, n = share, x.shape[1]
+    for _ in range(6):
+        fit = np.linalg.solve(form.T @ (w[:, None] * form) + ridge * np.eye(form.shape[1]), form.T @ (w[:, None] * x))
+        left = x - form @ fit
+        S = left.T @ (w[:, None] * left) / share.sum() + LEAST * np.eye(n)
+        w = share * (TAIL + n) / (TAIL + np.einsum("ni,ij,nj->n", left, np.linalg.inv(S), left))
+    return fit, S
 
-    `share` (n,): how much each window counts."""
+
+def laws_of(x, z, where, share):
+    """Mean by covariates and covariance at each node, where the log speed ratio (n,) is."""
     mean, scatter = np.empty((NODES.size, _N, _Z)), np.empty((NODES.size, _N, _N))
-    for k, node in enumerate(NODES):
-        away = where - node
+    for k, away in enumerate(where - NODES[:, None]):
         near = share * np.exp(-0.5 * (away / BANDWIDTH) ** 2)
-        form = np.column_stack([z, away])
-        w = near
-        for _ in range(6):
-            fit = np.linalg.solve(form.T @ (w[:, None] * form) + LEAST * np.eye(_Z + 1), form.T @ (w[:, None] * x))
-            left = x - form @ fit
-            S = left.T @ (w[:, None] * left) / near.sum() + LEAST * np.eye(_N)
-            w = near * (TAIL + _N) / (TAIL + np.einsum("ni,ij,nj->n", left, np.linalg.inv(S), left))
-        mean[k], scatter[k] = fit[:_Z].T, S
+        fit, scatter[k] = regression(np.column_stack([z, away]), x, near)
+        mean[k] = fit[:_Z].T
     return mean, scatter
+
+
+def _kinds(left, S, share):
+    """Probability of each kind (kinds, n), and squared distance from its mean."""
+    square = np.einsum("kni,kij,knj->kn", left, np.linalg.inv(S), left)
+    logs = np.log(share)[:, None] - 0.5 * np.linalg.slogdet(S)[1][:, None]
+    logs = logs - 0.5 * (TAIL + _N) * np.log1p(square / TAIL)
+    return np.exp(logs - np.logaddexp.reduce(logs)), square
 
 
 def kinds_of(x, z, rng, kinds=KINDS):
@@ -85,11 +95,7 @@ def kinds_of(x, z, rng, kinds=KINDS):
     share = np.full(kinds, 1.0 / kinds)
     for _ in range(150):
         left = x - z @ mean[:, :, :used].transpose(0, 2, 1)
-        square = np.einsum("kni,kij,knj->kn", left, np.linalg.inv(S), left)
-        logs = np.log(share)[:, None] - 0.5 * np.linalg.slogdet(S)[1][:, None]
-        logs = logs - 0.5 * (TAIL + _N) * np.log1p(square / TAIL)
-        r = np.exp(logs - logs.max(axis=0))
-        r /= r.sum(axis=0)
+        r, square = _kinds(left, S, share)
         w = r * (TAIL + _N) / (TAIL + square)
         share = r.mean(axis=1)
         for k, form in enumerate(w[:, :, None] * z):
@@ -102,20 +108,9 @@ def kinds_of(x, z, rng, kinds=KINDS):
 def rear_of(x, z, rear, kinds):
     """Mean of what the rear axle shows by covariates and features, and covariance, of each kind of windows."""
     mean, S, share = kinds
-    left = x - np.einsum("nc,kfc->knf", z, mean)
-    square = np.einsum("kni,kij,knj->kn", left, np.linalg.inv(S), left)
-    logs = np.log(share)[:, None] - 0.5 * np.linalg.slogdet(S)[1][:, None] - 0.5 * (TAIL + _N) * np.log1p(square / TAIL)
-    r, form, n = np.exp(logs - np.logaddexp.reduce(logs)), np.hstack([z, x]), rear.shape[1]
-    found, scatter = np.zeros((len(r), n, _Z + _N)), np.zeros((len(r), n, n))
-    for k, w in enumerate(r):
-        own = w
-        for _ in range(6):
-            fit = np.linalg.solve(form.T @ (own[:, None] * form) + np.eye(_Z + _N), form.T @ (own[:, None] * rear))
-            left = rear - form @ fit
-            C = left.T @ (own[:, None] * left) / w.sum() + LEAST * np.eye(n)
-            own = w * (TAIL + n) / (TAIL + np.einsum("ni,ij,nj->n", left, np.linalg.inv(C), left))
-        found[k], scatter[k] = fit.T, C
-    return found, scatter
+    shares = _kinds(x - z @ mean.transpose(0, 2, 1), S, share)[0]
+    fits, scatters = zip(*(regression(np.hstack([z, x]), rear, w, ridge=1.0) for w in shares), strict=True)
+    return np.stack(fits).transpose(0, 2, 1), np.stack(scatters)
 
 
 def _text(x):
