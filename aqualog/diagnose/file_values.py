@@ -21,6 +21,7 @@ __all__ = [
     "with_known",
 ]  # fmt: skip
 
+TORQUE_BY_DRIVE = 0.01  # relative, where a file gives no spread: a bus estimates its torque to 1 to 3 % (K)
 _MATTERS = ("mass", "torque_gain", "wheels.r_e_f", "wheels.r_e_r")
 
 
@@ -108,11 +109,14 @@ def day_to_day(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
     """Standard deviation of a parameter from drive to drive, in the effect's unit; 0 where the file gives no value.
 
     Applies to the whole car only: wind, surface, temperature and the torque's estimate do not act on a single axle.
-    Each key of the file counts here once.
+    Each key of the file counts here once. A load of one of several drives looks like that drive's own error of torque.
     """
     row = h.parameter(name).day_to_day
     if row is None or h.where is not None:
         return 0.0
+    if h.drive and row.kind == "inertia":
+        share = vehicle.spread.get("torque_gain", TORQUE_BY_DRIVE * vehicle.torque_gain) / vehicle.torque_gain
+        return row.value(math.hypot(vehicle.spread.get("mass", 0.0) / vehicle.mass, share), vehicle, h.where, 0.0)
     sd = vehicle.spread.get(row.key, 0.0)
     # the effect's gain is on top of the file's
     return sd / vehicle.torque_gain if row.key == "torque_gain" else sd

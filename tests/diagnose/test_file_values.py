@@ -6,7 +6,7 @@ import pytest
 
 from aqualog.core.provenance import uncertainty
 from aqualog.core.vehicle import KEYS, Provenance, Vehicle
-from aqualog.diagnose.file_values import calibrated_enough, deviation, key_of, not_calibrated
+from aqualog.diagnose.file_values import calibrated_enough, day_to_day, deviation, key_of, not_calibrated
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.model.effects import EFFECTS
 
@@ -123,3 +123,11 @@ def test_what_to_calibrate_first():
     bound = replace(by_hand, provenance={"mass": Provenance("calibrated"), "torque_gain": Provenance("guess", 0.02)})
     assert calibrated_enough(bound) == ()  # the drives have shown the ratio of both
     assert calibrated_enough(Vehicle()) == ("mass", "torque_gain", "wheels.r_e_f", "wheels.r_e_r")
+
+
+def test_a_load_of_one_drive_looks_like_the_error_of_its_torque():
+    own = replace(Hypothesis(EFFECTS["payload_mass"], None, ("delta_mass",)), drive="b.mf4")
+    assert day_to_day(own, "delta_mass", CAR) == pytest.approx(14.0)
+    scattered = replace(CAR, spread={"torque_gain": 0.024, "mass": 56.0})
+    assert day_to_day(own, "delta_mass", scattered) == pytest.approx(70.0)
+    assert day_to_day(replace(own, drive=""), "delta_mass", scattered) == 56.0
