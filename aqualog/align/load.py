@@ -43,7 +43,9 @@ class LoadedLong(NamedTuple):
 
 def read_options(signal_map: SignalMap, dbc: Sequence[Path] = ()) -> ReadOptions:
     """Return what readers need to know of a signal map."""
-    return ReadOptions(tuple(dbc), signal_map.time_channel, signal_map.time_unit, signal_map.csv)
+    return ReadOptions(
+        tuple(dbc), signal_map.time_channel, signal_map.time_unit, signal_map.csv, tuple(signal_map.clocks)
+    )
 
 
 class _Request(NamedTuple):
@@ -201,7 +203,7 @@ def read_signals(
 def idle_files(log: DriveLog, found: Found) -> list[FileFaults]:
     """Return a note on files of a drive that hold none of its signals: one for all of them, or no note."""
     used = {info.file for _, info in found.values()}
-    idle = [path.name for path in log.paths if path.name not in used]
+    idle = [path.name for path in log.paths if log.goes_on.get(path.name, path.name) not in used]
     if not idle:
         return []
     give = "gives" if len(idle) == 1 else "give"
@@ -223,7 +225,7 @@ def find_channels(log: DriveLog, signal_map: SignalMap, wanted: Callable[[str], 
         what = f'no column is called "{signal_map.time_channel}"'
         raise ConfigError(what, where="[time] channel", expected="a column of the log", hint="`aqualog inspect LOG`")
     try:
-        found = {s: hit for s, hit in resolve(channels, signal_map).items() if wanted(s)}
+        found = {s: hit for s, hit in resolve(channels, signal_map, log.apart).items() if wanted(s)}
     except SignalError as error:
         if not notes:
             raise

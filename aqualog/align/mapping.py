@@ -167,11 +167,13 @@ def read_alike(one: Entry, other: Entry) -> bool:
     return one.symbol[:-2] == other.symbol[:-2] or (one.unit, one.scale) == (other.unit, other.scale)
 
 
-def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str, tuple[Entry, ChannelInfo]]:
+def resolve(
+    channels: Sequence[ChannelInfo], signal_map: SignalMap, apart: str = ""
+) -> dict[str, tuple[Entry, ChannelInfo]]:
     """Find the channel of every mapped symbol, and of every canonical name that needs no map.
 
     A map entry matches a channel by `file:path`, by path, by the end of a path after a separator, or by name. It must
-    match exactly one channel.
+    match exactly one channel. `apart`: why files with the same channels are not one recording.
 
     Raises
     ------
@@ -208,7 +210,7 @@ def resolve(channels: Sequence[ChannelInfo], signal_map: SignalMap) -> dict[str,
             faults.append(f"{symbol}: several channels bear this name: {_listed(matches)}")
             doubled += len({m.file for m in matches}) > 1
     if doubled >= OF_SEPARATE_DRIVES:
-        raise separate_drives(doubled, (c.file for c in channels))
+        raise separate_drives(doubled, (c.file for c in channels), apart)
     if len(missing) > SHOWN:
         faults.append(f"{len(missing) - SHOWN} more of the map's channels are missing: {listed(missing[SHOWN:], 3)}")
     if faults:
@@ -237,10 +239,11 @@ OF_SEPARATE_DRIVES = 3
 """Signals with one name in several files from which these are of separate drives."""
 
 
-def separate_drives(names: int, files: Iterable[str]) -> SignalError:
-    """Return the error for files whose channels bear the same names."""
+def separate_drives(names: int, files: Iterable[str], apart: str = "") -> SignalError:
+    """Return the error for files whose channels bear the same names; `apart` says why they are not one recording."""
     return SignalError(
-        f"several channels bear the same {names} names: these look like separate drives",
+        f"several channels bear the same {names} names: these look like separate drives"
+        + (f" ({apart})" if apart else ""),
         where=", ".join(dict.fromkeys(files)),
         expected="the files of ONE drive",
         hint="run them one by one, or all by `aqualog campaign init FOLDER` and `aqualog batch`",

@@ -167,15 +167,18 @@ def _joined(
     return MapProposal(SignalMap(entries), remarks, left_out, tuple(dict.fromkeys(notes)), tuple(found), unmapped)
 
 
-def check_one_drive(channels: Iterable[tuple[str, str]], proposals: Iterable[Proposal]) -> None:
-    """Raise a SignalError if several files bear the same names: (file, path) of all channels, and what is proposed."""
+def check_one_drive(channels: Iterable[tuple[str, str]], proposals: Iterable[Proposal], apart: str = "") -> None:
+    """Raise a SignalError if several files bear the same names: (file, path) of all channels, and what is proposed.
+
+    `apart`: why files with the same channels are not one recording.
+    """
     files: dict[str, set[str]] = {}
     for file, path in channels:
         files.setdefault(path, set()).add(file)
     names = [p.entry.channel[0] for p in proposals]
     doubled = [n for n in names if any(len(files.get(x, ())) > 1 for x in (n, n.partition(":")[2]))]
     if len(doubled) >= OF_SEPARATE_DRIVES:
-        raise separate_drives(len(doubled), sorted(set().union(*files.values())))
+        raise separate_drives(len(doubled), sorted(set().union(*files.values())), apart)
 
 
 def lacking_notes(found: Collection[str], unmapped: Sequence[str]) -> list[str]:

@@ -112,11 +112,12 @@ def _proposals(drive: Drive) -> tuple[frozenset[str], Mapping[str, Proposal]]:
             if sum(c.count for c in log.channels()) >= LONG or all(f"omega_{w}" in names for w in WHEELS):
                 return frozenset(), {}
             channels, _ = log.read_readable()
+            apart = log.apart
     except AqualogError:
         return frozenset(), {}
     proposals = look_at(channels).proposals
     found = {s: p for s, p in proposals.items() if p.reason != CANONICAL}
-    check_one_drive([(c.info.file, c.info.path) for c in channels], found.values())
+    check_one_drive([(c.info.file, c.info.path) for c in channels], found.values(), apart)
     return frozenset(proposals.keys() - found.keys()), found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,7 +39,8 @@ _HEADER = ("channel", "unit", "samples", "Hz", "from s", "to s", "min", "max", "
 class Contents(Result):
     """The channels of one drive's files, and the signals that they look like.
 
-    `unmapped` are the channels, `name [unit]`, that look like no signal.
+    `unmapped` are the channels, `name [unit]`, that look like no signal. `goes_on`: of each file that goes on with a
+    recording, the file that begins it and has the channels.
     """
 
     drive: Drive
@@ -48,6 +49,7 @@ class Contents(Result):
     proposals: Mapping[str, Proposal]
     absolute: frozenset[str]
     unmapped: tuple[str, ...] = ()
+    goes_on: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def exit_code(self) -> ExitCode:
@@ -98,7 +100,9 @@ class Contents(Result):
         for path, kind in zip(self.drive.paths, self.formats, strict=True):
             own = [o for o in self.overviews if o.file == path.name]
             clock = "absolute time" if path.name in self.absolute else "a clock of its own"
-            lines.append(f"{cut(path.name, CELL)}: {kind.upper()}, {counted(len(own), 'channel')}, {clock}")
+            begin = self.goes_on.get(path.name)
+            what = f"goes on with {cut(begin, CELL)}" if begin else f"{counted(len(own), 'channel')}, {clock}"
+            lines.append(f"{cut(path.name, CELL)}: {kind.upper()}, {what}")
             if own:
                 rows = [_row(o, by_channel) for o in own]
                 lines += [table(_HEADER, rows), ""]
@@ -187,7 +191,7 @@ def inspect(drive: DriveLike, *, progress: Progress = None) -> Contents:
     with one.reading(), DriveLog(one.paths, read_options(one.signal_map, one.dbc)) as log:
         hear("reading")
         channels, lost = log.read_readable()
-        formats, faults = log.formats, log.faults
+        formats, faults, goes_on = log.formats, log.faults, log.goes_on
         hear("looking at the channels")
         found, proposals = look_at(channels)
     remarks = [*lost, *((p.name, n) for p, f in zip(one.paths, faults, strict=True) for n in f.notes)]
@@ -201,6 +205,7 @@ def inspect(drive: DriveLike, *, progress: Progress = None) -> Contents:
         proposals,
         frozenset(c.info.file for c in channels if c.absolute),
         tuple(unmapped_names([c.info for c in channels], [p.entry.channel for p in proposals.values()])),
+        goes_on,
         notes=(*notes, *changes),
         has_loss=bool(damaged),
         sources=one.sources,

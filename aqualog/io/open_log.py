@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Generator, Iterable, Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 
 from aqualog.core.errors import LogError
 from aqualog.core.records import Channel, ChannelInfo, FileFaults
 from aqualog.guard.reading import reading
+from aqualog.io.joined import Joined, Split, split_of
 from aqualog.io.reader import Closing, Part, Reader, ReadOptions, csv_hint, format_of
 
 __all__ = ["LOG_SUFFIXES", "DriveLog", "open_log", "read_readable", "sniff", "stored_in"]
@@ -97,7 +100,7 @@ class _Watched(Closing):
 
 
 class DriveLog(Closing):
-    """The files of one drive as one reader.
+    """The files of one drive as one reader; parts of one recording are joined under the name of the first.
 
     If one file cannot be opened, those opened before it are closed again.
     """
@@ -108,13 +111,37 @@ class DriveLog(Closing):
         if twice:
             raise LogError(f"two files of one drive are both called {sorted(twice)[0]}", hint="rename one of them")
         self.paths = tuple(paths)
+        self._options = options or ReadOptions()
         with ExitStack() as stack:
             self._readers = [stack.enter_context(open_log(p, options)) for p in paths]
             self._stack = stack.pop_all()
 
+    @cached_property
+    def _split(self) -> Split:
+        return split_of(self.paths, self._readers, self._options.own_clocks, lambda p: open_log(p, self._options))
+
+    @cached_property
+    def _recordings(self) -> list[tuple[Path, Reader]]:
+        """First file and reader of each recording."""
+        found: list[tuple[Path, Reader]] = []
+        for chain in self._split.chains:
+            first, readers = self.paths[chain[0]], [self._readers[i] for i in chain]
+            found.append((first, Joined(first.name, readers) if len(readers) > 1 else readers[0]))
+        return found
+
+    @property
+    def goes_on(self) -> dict[str, str]:
+        """Of each file that goes on with a recording, the one that begins it and whose name the channels bear."""
+        return {self.paths[i].name: self.paths[c[0]].name for c in self._split.chains for i in c[1:]}
+
+    @property
+    def apart(self) -> str:
+        """Why files with the same channels are not parts of one recording; empty without such files."""
+        return self._split.apart
+
     def channels(self) -> list[ChannelInfo]:
         """Channels of all files."""
-        return [c for r in self._readers for c in r.channels()]
+        return [c for _, r in self._recordings for c in r.channels()]
 
     @property
     def formats(self) -> tuple[str, ...]:
@@ -123,14 +150,17 @@ class DriveLog(Closing):
 
     @property
     def faults(self) -> list[FileFaults]:
-        """What each file lost; complete after `read`."""
-        return [r.faults for r in self._readers]
+        """What each file lost; complete after `read`. The first part of a recording says which ones go on with it."""
+        names = [p.name for p in self.paths]
+        said = [self._split.note(names, i) for i in range(len(names))]
+        found = [r.faults for r in self._readers]
+        return [replace(f, notes=(s, *f.notes)) if s else f for f, s in zip(found, said, strict=True)]
 
     def read(self, wanted: Iterable[ChannelInfo]) -> dict[tuple[str, str], Channel]:
         """Decode channels of any of the files, keyed by (file, path)."""
         asked = list({(w.file, w.path): w for w in wanted}.values())
         result: dict[tuple[str, str], Channel] = {}
-        for path, reader in zip(self.paths, self._readers, strict=True):
+        for path, reader in self._recordings:
             own = [w for w in asked if w.file == path.name]
             if own:
                 result |= {(c.info.file, c.info.path): c for c in reader.read(own)}
@@ -146,7 +176,7 @@ class DriveLog(Closing):
         """
         channels: list[Channel] = []
         lost: list[tuple[str, str]] = []
-        for path, reader in zip(self.paths, self._readers, strict=True):
+        for path, reader in self._recordings:
             own, sentences = read_readable(reader, list(reader.channels()))
             channels += own
             lost += [(path.name, what) for what in sentences]
@@ -156,7 +186,7 @@ class DriveLog(Closing):
         """The same piece by piece, for logs that are longer than memory."""
         asked = list({(w.file, w.path): w for w in wanted}.values())
         out: list[Part] = []
-        for path, reader in zip(self.paths, self._readers, strict=True):
+        for path, reader in self._recordings:
             own = [w for w in asked if w.file == path.name]
             out += reader.parts(own) if own else []
         return out

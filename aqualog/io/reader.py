@@ -82,13 +82,14 @@ class ReadOptions:
     """What the user says about the files beyond their content.
 
     `time_channel` and `time_unit` apply to tables (CSV, Parquet), `csv` to CSV files by name or pattern; `dbc` decodes
-    raw CAN frames.
+    raw CAN frames. `own_clocks`: names or patterns of files whose clock is corrected.
     """
 
     dbc: tuple[Path, ...] = ()
     time_channel: str | None = None
     time_unit: str | None = None
     csv: Mapping[str, CsvFormat] = field(default_factory=dict)
+    own_clocks: tuple[str, ...] = ()
 
 
 class Part(NamedTuple):

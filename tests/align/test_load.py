@@ -47,6 +47,7 @@ def test_one_channel_for_two_signals_under_different_names(tmp_path, entries):
 def test_all_in_use(paths, tmp_path):
     class Log:
         def __init__(self):
+            self.goes_on = {}
             self.paths = [tmp_path / p for p in paths]
 
     class Info:
