@@ -22,6 +22,7 @@ from aqualog.align.mapping import Entry, channel_id
 from aqualog.align.motion import Motion, derivative, even_times, fit, on_grid, smooth, track, wheel_turn
 from aqualog.align.mounting import gyro_beside, turned_axes
 from aqualog.align.overview import ChannelOverview, overview, rotated_triples
+from aqualog.align.timebase import without_copies
 from aqualog.core.notation import ACCEPTED, SYMBOLS, WHEELS
 from aqualog.core.records import Channel, FloatArray, TimeArray
 from aqualog.core.units import is_unit, parse_unit
@@ -129,6 +130,7 @@ def look_at(channels: Sequence[Channel]) -> Look:
 
     Times count from the first sample of all channels.
     """
+    channels = list(without_copies(dict(enumerate(channels)))[0].values())
     origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
     found = [overview(c, origin_ns=origin) for c in channels]
     triples = rotated_triples(found)

@@ -23,7 +23,7 @@ from aqualog.align.grid import (
     placed,
 )
 from aqualog.align.mapping import Entry, SignalMap
-from aqualog.align.timebase import ClockRepair, OfLast
+from aqualog.align.timebase import ClockRepair, OfLast, without_copies
 from aqualog.core.errors import SignalError, listed
 from aqualog.core.notation import SYMBOLS
 from aqualog.core.records import Channel, ChannelInfo, FileFaults, Origin, Quality, Signals, TimeFaults
@@ -206,6 +206,7 @@ def build_signals(
     SignalError
         If no signal is usable, units do not fit, or the sources' clocks cannot be joined.
     """
+    channels, copies = without_copies({name: channel for name, (_, channel) in mapped.items()})
     repairs: dict[str, ClockRepair] = {}
     span = OfLast(span_of)  # channels of one group have the same stamps
     samples: dict[str, Samples] = {}
@@ -213,7 +214,7 @@ def build_signals(
     def take(cleaners: Mapping[str, Cleaner]) -> dict[str, Taken]:
         taken = {}
         for name, cleaner in cleaners.items():
-            channel = mapped[name][1]
+            channel = channels[name]
             repair = repairs.setdefault(channel.info.file, ClockRepair())
             t_ns, order, faults = repair.repair(corrected(channel.t_ns, signal_map, channel.info.file))
             is_changed = faults.back_steps or faults.duplicates or faults.strays
@@ -227,7 +228,9 @@ def build_signals(
     plan = plan_drive(found, take, signal_map=signal_map, vehicle=vehicle, rate_hz=rate_hz, dbc=dbc)
     table, bridged = plan.table(samples)
     missing = {name: table.frame[name].null_count() for name in plan.symbols}
-    facts = plan.facts(missing, frozenset(name for name, gaps in bridged.items() if gaps), file_faults)
+    facts = plan.facts(
+        missing, frozenset(name for name, gaps in bridged.items() if gaps), [*file_faults, FileFaults(notes=copies)]
+    )
     return replace(facts, frame=table.frame)
 
 

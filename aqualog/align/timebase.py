@@ -8,6 +8,7 @@
 | stray | up to 100 samples elsewhere, then on as before; at either end a day or more away | left out |
 | wrap | back by 2^16, 2^32, ... ticks of the counter, a minute, an hour, a day, a week | unwrapped |
 | doubled block | back by more than 1 s, then the same uneven stamps again up to where it was | the later copy wins |
+| block written twice | back, then rows with the same stamps and the same changing values | counted once, no loss |
 | reset | back by more than 1 s, no wrap | goes on 1 s after the last sample: the true pause is unknown |
 | pause | more than 1 s and 10 sample times without a sample | left as a gap |
 """
@@ -15,22 +16,25 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.core.records import BoolArray, TimeArray, TimeFaults
+from aqualog.core.records import BoolArray, Channel, FloatArray, TimeArray, TimeFaults
 
-__all__ = ["DAY_NS", "MEDIAN_OF", "ClockRepair", "OfLast"]
+__all__ = ["DAY_NS", "MEDIAN_OF", "ClockRepair", "OfLast", "without_copies"]
 
 MEDIAN_OF = 1 << 18  # steps, the first ones: a log that is read in pieces has the same median
 
 _Value = TypeVar("_Value")
+_Key = TypeVar("_Key", bound=Hashable)
 
 _SECOND = 1_000_000_000
 _EVEN, _LEAST_UNEVEN = 1e-3, 3  # of the sample time; steps by which a block of stamps is known again
+_LEAST_CHANGES = 3  # of values, by which a block of rows is: no second pass of a sensor repeats them
 _TICKS_NS = (1, 100, 1_000, 10_000, 100_000, 1_000_000, 10_000_000, 1_000_000_000)
 _WIDTHS = (16, 24, 32)
 _CLOCKS_S = (60, 3600, 24 * 3600, 7 * 24 * 3600)  # of the minute, the hour, the day, the (GNSS) week
@@ -216,3 +220,48 @@ def _is_doubled(t_ns: TimeArray, begin: int, last: int) -> bool:
     steps = np.diff(block[:-1])
     uneven = int((np.abs(steps - np.median(steps)) > _EVEN * np.median(steps)).sum()) if steps.size else 0
     return uneven >= _LEAST_UNEVEN and bool(np.array_equal(block[:-1], t_ns[last + 1 : last + block.size]))
+
+
+def without_copies(channels: Mapping[_Key, Channel]) -> tuple[dict[_Key, Channel], tuple[str, ...]]:
+    """Leave out rows of the channels of a drive that a logger has written twice; nothing is lost by them.
+
+    Returns the channels, and a note for each file with such rows.
+    """
+    kept = dict(channels)
+    notes: dict[str, str] = {}
+    left = [key for key, c in channels.items() if (np.diff(c.t_ns) < 0).any()]
+    while left:
+        file, t = channels[left[0]].info.file, channels[left[0]].t_ns
+        own = [k for k in left if channels[k].info.file == file and np.array_equal(channels[k].t_ns, t)]
+        left = [k for k in left if k not in own]
+        is_copy = _written_twice(t, [channels[k].values for k in own])
+        if not is_copy.any():
+            continue
+        for k in own:
+            kept[k] = replace(channels[k], t_ns=t[~is_copy], values=channels[k].values[~is_copy])
+        begin, end = (float(x - t[0]) * 1e-9 for x in (t[is_copy].min(), t[is_copy].max()))
+        rows = f"{int(is_copy.sum())} rows from {begin:.2f} to {end:.2f} s"
+        notes.setdefault(file, f"{file}: {rows} stand twice, with the same stamps and values: counted once")
+    return kept, tuple(notes.values())
+
+
+def _written_twice(t_ns: TimeArray, columns: Sequence[FloatArray]) -> BoolArray:
+    """Flag rows (n,) that repeat those before them in stamps and all values, as a logger writes a buffer twice.
+
+    Rows whose values do not change prove nothing: a car that stands has them again after its clock was set back.
+    """
+    copies = np.zeros(t_ns.size, dtype=np.bool_)
+    for k in np.flatnonzero(np.diff(t_ns) < 0).tolist():
+        same = np.flatnonzero(t_ns[: k + 1] == t_ns[k + 1])
+        if not same.size:
+            continue
+        first = int(same[-1])
+        rows = min(k + 1 - first, t_ns.size - k - 1)
+        block, again = slice(first, first + rows), slice(k + 1, k + 1 + rows)
+        changes = np.zeros(max(rows - 1, 0), dtype=np.bool_)
+        for x in columns:
+            changes |= np.abs(np.diff(x[block])) > 0.0  # not from or to a missing value
+        is_same = all(np.array_equal(x[block], x[again], equal_nan=True) for x in columns)
+        if is_same and np.array_equal(t_ns[block], t_ns[again]) and int(changes.sum()) >= _LEAST_CHANGES:
+            copies[again] = True
+    return copies

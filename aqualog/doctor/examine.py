@@ -11,6 +11,7 @@ from aqualog.align.load import load_signals, read_options
 from aqualog.align.mapping import SignalMap
 from aqualog.align.overview import find_mounting, overview
 from aqualog.align.quantity import Quantity
+from aqualog.align.timebase import without_copies
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import FileFaults, Remark, Signals
 from aqualog.core.vehicle import Vehicle
@@ -108,6 +109,7 @@ def _file(
         what = error.what + (f"; expected {error.expected}" if error.expected else "")
         unreadable = Finding("unreadable", "unreadable", path.name, "", what, error.hint)
         return FileState(path.name, "", size), [unreadable], None, []
+    channels = list(without_copies(dict(enumerate(channels)))[0].values())
     origin = min((int(c.t_ns.min()) for c in channels if c.t_ns.size), default=0)
     end = max((int(c.t_ns.max()) for c in channels if c.t_ns.size), default=0)
     found = [overview(c, origin_ns=origin) for c in channels]

@@ -121,9 +121,9 @@ class DriveLog(Closing):
         return split_of(self.paths, self._readers, self._options.own_clocks, lambda p: open_log(p, self._options))
 
     @cached_property
-    def _recordings(self) -> list[tuple[Path, Reader]]:
+    def _recordings(self) -> list[tuple[Path, Reader | Joined]]:
         """First file and reader of each recording."""
-        found: list[tuple[Path, Reader]] = []
+        found: list[tuple[Path, Reader | Joined]] = []
         for chain in self._split.chains:
             first, readers = self.paths[chain[0]], [self._readers[i] for i in chain]
             found.append((first, Joined(first.name, readers) if len(readers) > 1 else readers[0]))
@@ -196,7 +196,7 @@ class DriveLog(Closing):
         self._stack.close()
 
 
-def read_readable(reader: Reader, wanted: Sequence[ChannelInfo]) -> tuple[list[Channel], list[str]]:
+def read_readable(reader: Reader | Joined, wanted: Sequence[ChannelInfo]) -> tuple[list[Channel], list[str]]:
     """Decode channels of one file; of an MDF, group by group, with a note on each group that cannot be decoded.
 
     Returns

@@ -154,6 +154,15 @@ def test_jumping_time_stamps_do_not_fill_the_memory():
         build(c)
 
 
+def test_a_block_that_is_written_twice_counts_once_and_is_no_loss():
+    c = channel("omega_fl", 90 + np.sin(np.arange(2500) / 9), "rad/s")
+    rows = np.r_[0:1000, 600:2500]
+    s = build(Channel(c.info, c.t_ns[rows], c.values[rows], absolute=False))
+    assert s.frame.equals(build(c).frame)
+    assert (s.quality.has_loss, s.quality.faults.resets, s.quality.dropped_samples) == (False, 0, 0)
+    assert any("400 rows from 6.00 to 9.99 s stand twice" in n for n in s.quality.notes)
+
+
 def test_many_doubled_stamps_are_a_loss_and_a_note():
     c = channel("omega_fl", np.full(1000, 90.0), "rad/s")
     s = build(Channel(c.info, np.sort(np.tile(c.t_ns[:500], 2)), c.values, absolute=False))

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from aqualog.align.timebase import ClockRepair
-from aqualog.core.records import TimeFaults
+from aqualog.align.timebase import ClockRepair, without_copies
+from aqualog.core.records import Channel, ChannelInfo, TimeFaults
 
 MS = 1_000_000
 S = 1_000_000_000
@@ -138,6 +138,27 @@ def test_the_joint_of_a_doubled_block_may_be_of_two_halves():
     fixed, _, found, _ = repair(t)
     assert "resets" not in found
     assert fixed[-1] == t[-1]
+
+
+@pytest.mark.parametrize("begin", [1000, 0])
+def test_rows_written_twice_count_once(begin):
+    """On an even grid stamps prove nothing, but the values of moving signals do."""
+    t = steady(3000)
+    rows = np.concatenate([np.arange(1500), np.arange(begin, 1500), np.arange(1500, 3000)])
+    infos = [ChannelInfo(n, n, "", rows.size, "a.csv") for n in ("noise", "constant")]
+    values = [np.random.default_rng(1).normal(size=3000), np.zeros(3000)]
+    values[0][1200] = np.nan
+    written = {i.name: Channel(i, t[rows], x[rows], absolute=False) for i, x in zip(infos, values, strict=True)}
+    kept, notes = without_copies(written)
+    for info, x in zip(infos, values, strict=True):
+        assert np.array_equal(kept[info.name].t_ns, t)
+        assert np.array_equal(kept[info.name].values, x, equal_nan=True)
+    assert notes == (
+        f"a.csv: {1500 - begin} rows from {begin * 0.01:.2f} to 14.99 s stand twice, with the same stamps and values: counted once",
+    )
+    assert without_copies({0: written["constant"]})[1] == ()
+    written["noise"].values[1600] += 1e-6  # another drive on the same clock, or another pass
+    assert without_copies(written)[1] == ()
 
 
 def test_channels_of_one_file_shift_together_and_share_a_repair():
