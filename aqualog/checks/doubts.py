@@ -48,7 +48,8 @@ class Doubt:
     """One finding of a check.
 
     `ways`: by symbol, what would put it right; with several ways the log does not show which. `advice`: what else to
-    do, or where no change of the map helps. `value` with `ci95`: what was measured, SI.
+    do, or where no change of the map helps. `radius`: what to change in the vehicle file, which applies where the log
+    has rotations: a speed at the rim does not depend on the radius. `value` with `ci95`: what was measured, SI.
     """
 
     kind: str
@@ -58,6 +59,7 @@ class Doubt:
     ways: tuple[Mapping[str, Change], ...] = ()
     value: float = math.nan
     ci95: tuple[float, float] = (math.nan, math.nan)
+    radius: str = ""
 
 
 def remarks_of(doubts: Sequence[Doubt], origins: Mapping[str, Origin]) -> tuple[Remark, ...]:
@@ -86,6 +88,11 @@ def _remark(doubt: Doubt, sure: Mapping[str, Change], origins: Mapping[str, Orig
     put = " or ".join(", ".join(way) for way in ways)
     said = "" if not put else f"in the signal map, under [signals]: {'either ' if len(ways) > 1 else ''}{put}"
     advice = "; ".join(x for x in (said, doubt.advice) if x)
+    read = [_entry_of(origins, s, c) for way in wholes for s, c in way.items()]
+    if doubt.radius and all(not r.unit or parse_unit(r.unit).dimension == "angular_speed" for r in read):
+        # a unit that the log itself declares is right more often than a number that someone has typed
+        is_declared = all(r.unit and r.entry.unit is None for r in read)
+        lines, advice = ((), doubt.radius) if is_declared or not by_unit else (lines, f"{advice}; or {doubt.radius}")
     return Remark(doubt.kind, doubt.signals, doubt.what, advice, lines, doubt.value, doubt.ci95)
 
 

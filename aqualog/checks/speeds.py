@@ -23,6 +23,8 @@ RATIO = (
 OFF = 0.05  # of speeds: no wear and no GNSS is so far off; a tyre of another size is
 MOVING = 3.0  # [m/s] from which a ratio of speeds means something
 STEADY = 0.04  # between the quartiles of such a ratio: the resolution of slow wheels, and a bend
+RADII = (0.2, 0.6)  # [m] of tyres from the smallest car to a van
+_SIDES = {"f": "front", "r": "rear"}
 _UNITS = {3.6: ("km/h", "m/s"), 2.23694: ("mph", "m/s"), 1.60934: ("km/h", "mph")}  # true unit, unit taken: too large
 _NEAR = 0.04  # about such a factor
 _ROUGH = 1.3  # about that of g, as noise and grades change it
@@ -38,6 +40,9 @@ def scale_doubts(windows: Windows) -> Iterator[Doubt]:
 def _speeds(windows: Windows) -> Iterator[Doubt]:
     wheels = windows.wheels
     if not wheels:
+        return
+    if (axles := _axles(windows)) is not None:
+        yield axles
         return
     common = middle(list(wheels.values()))
     radius = {w: windows.vehicle.r_e(w) for w in wheels}
@@ -57,6 +62,34 @@ def _speeds(windows: Windows) -> Iterator[Doubt]:
         )
         advice = "check the units (km/h, mph, m/s, rad/s) and r_e in the vehicle file"
         yield Doubt("scale", ("v_x", *(f"omega_{w}" for w in wheels)), what, advice, ways, ratio)
+
+
+def _axles(windows: Windows) -> Doubt | None:
+    """Return what is wrong with an axle both of whose wheels are off by one factor: first of all its radius."""
+    wheels = windows.wheels
+    if len(wheels) < 4 or any(_is_off(_ratio(wheels[f"{a}l"], wheels[f"{a}r"])) for a in "fr"):
+        return None
+    speed = {a: middle([wheels[f"{a}l"], wheels[f"{a}r"]]) for a in "fr"}
+    between = _ratio(speed["f"], speed["r"])
+    if not _is_off(between):
+        return None
+    factor = {"f": between, "r": 1.0 / between}
+    beside = "the speed of the other axle"
+    if "v_x" in windows:
+        by_road = {a: r for a in "fr" if _is_off(r := _ratio(speed[a], windows["v_x"]))}
+        factor, beside = (by_road, "v_x") if by_road else (factor, beside)
+    size = {a: windows.vehicle.r_e(f"{a}l") / x for a, x in factor.items()}
+    own = [
+        {f"omega_{a}{side}": Change(1.0 / x, radius=windows.vehicle.r_e(f"{a}l")) for side in "lr"}
+        for a, x in factor.items()
+    ]
+    names = tuple(name for way in own for name in way)
+    told = ", ".join(f"both {_SIDES[a]} wheels are {_factor(x)} times" for a, x in factor.items())
+    keys = (" and " if beside == "v_x" else " or ").join(f"r_e_{a} = {r:.3f}" for a, r in size.items())
+    is_tyre = all(RADII[0] < r < RADII[1] for r in size.values())
+    radius = f"check the rolling radius in the vehicle file: {keys} fits, under [wheels]" if is_tyre else ""
+    ways = ({n: c for way in own for n, c in way.items()},) if beside == "v_x" else tuple(own)
+    return Doubt("scale", names, f"{told} {beside}", "check unit and tyre size", ways, radius=radius)
 
 
 def _is_off(ratio: float) -> bool:

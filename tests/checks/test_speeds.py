@@ -1,5 +1,7 @@
 """Scales of speeds: one wheel against the others, wheels against v_x; the unit that was mistaken is named."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -107,3 +109,44 @@ def test_a_factor_that_no_unit_explains_stays_one():
 @pytest.mark.parametrize(("true", "taken", "size"), [("g", "m/s^2", 1 / 9.80665), ("m/s^2", "g", 9.80665)])
 def test_the_right_unit_of_the_acceleration_is_proposed(true, taken, size):
     assert lines({"a_x": size}, a_x=taken) == (f'a_x = {{ channel = "A_X", unit = "{true}" }}',)
+
+
+def axle(axle, r_e, *, unit="rad/s", mapped=None, without=()):
+    """A drive whose wheels of one axle have this radius in the vehicle file, not their own."""
+    own = {n: x for n, x in DRIVE.items() if n not in without}
+    known = {
+        s: replace(o, unit=unit, mapped={"channel": [s], **({"unit": mapped} if mapped else {})})
+        if s.startswith("omega")
+        else o
+        for s, o in origins().items()
+    }
+    return [r for r in look(signals(own, origins=known), replace(CAR, **{f"r_e_{axle}": r_e})) if r.kind == "scale"]
+
+
+@pytest.mark.parametrize("side", ["f", "r"])
+@pytest.mark.parametrize("r_e", [0.25, 0.28, 0.37])
+def test_an_axle_that_is_off_by_its_radius(side, r_e):
+    """At 0.25 m km/h would explain the factor, too, but the log declares rad/s."""
+    (remark,) = axle(side, r_e)
+    assert remark.what.startswith(
+        f"both {'front' if side == 'f' else 'rear'} wheels are {r_e / CAR.r_e(side + 'l'):.2f}"[:-1]
+    )
+    assert (
+        remark.advice
+        == f"check the rolling radius in the vehicle file: r_e_{side} = {CAR.r_e(side + 'l'):.3f} fits, under [wheels]"
+    )
+    assert remark.lines == ()
+
+
+def test_without_a_velocity_either_axle_may_be_off():
+    (remark,) = axle("f", 0.25, without=("v_x",))
+    assert f"r_e_f = {CAR.r_e('fl'):.3f} or r_e_r = 0.25" in remark.advice
+
+
+def test_a_radius_does_not_move_speeds_at_the_rim_nor_explain_another_unit():
+    own = {n: x * (1.1 if n in ("omega_fl", "omega_fr") else 1.0) for n, x in DRIVE.items()}
+    (remark,) = (r for r in look(signals(own, origins=origins(wheels="m/s")), CAR) if r.kind == "scale")
+    assert "r_e" not in remark.advice
+    assert len(remark.lines) == 2
+    found = lines({"omega_rl": 9.5493, "omega_rr": 9.5493}, wheels="rad/s")
+    assert [line for line in found if 'unit = "rpm"' in line]
