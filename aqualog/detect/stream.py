@@ -20,7 +20,7 @@ from aqualog.detect.margin.watch import MARGIN, Least
 from aqualog.detect.registry import OWN, RIVALS, all_of, check_needs, running_order
 from aqualog.detect.slip_slope.history import Memory
 from aqualog.detect.slip_slope.watch import DropWatch, remarks
-from aqualog.detect.verdict import JOINT, judge
+from aqualog.detect.verdict import JOINT, Unjudged, judge
 from aqualog.features.stream import INPUTS, Features, FeatureStream
 
 __all__ = [
@@ -132,6 +132,7 @@ class Through:
         self._way = Way(self._stream.dt)
         self._least = Least(self._stream.dt)
         self._judged = 0
+        self._unjudged = Unjudged(self._stream.dt)
 
     def push(self, columns: Mapping[str, FloatArray]) -> Piece:
         """Take the next samples; as `DriveStream.push`."""
@@ -141,8 +142,9 @@ class Through:
         self._events += piece.events
         self._way.push(piece.features["v_x_hat"])
         self._least.push(piece.features, next((t for t in piece.tracks if t.detector == MARGIN.name), None))
-        joint = (t for t in piece.tracks if t.detector in JOINT)
-        self._judged += max((int(np.count_nonzero(~np.isnan(t.statistic))) for t in joint), default=0)
+        if joint := [~np.isnan(t.statistic) for t in piece.tracks if t.detector in JOINT]:
+            self._judged += max(int(np.count_nonzero(j)) for j in joint)
+            self._unjudged.push(columns, np.logical_or.reduce(joint))
         return piece
 
     def result(self, signals: Signals, features: Mapping[str, FloatArray], tracks: tuple[Track, ...]) -> DriveResult:
@@ -165,7 +167,7 @@ class Through:
             unavailable=stream.unavailable,
             limited=stream.limited,
             vehicle_name=self._vehicle.name,
-            notes=(*(r.sentence for r in checks), *remarks(slopes)),
+            notes=(*(r.sentence for r in checks), *filter(None, [self._unjudged.note()]), *remarks(slopes)),
             slopes=slopes,
             checks=checks,
             judgement=judgement,

@@ -11,6 +11,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
 
+from aqualog.core.errors import listed
 from aqualog.core.judgement import Episode, Judgement
 from aqualog.core.notation import SYMBOLS
 from aqualog.core.records import DriveResult, Event, SlopeSummary, TimeFaults
@@ -220,11 +221,13 @@ def _utc(start_ns: int) -> str:
 
 def _problems(result: DriveResult) -> list[str]:
     """Problems of the data that limit how far the page can be trusted."""
-    quality = result.signals.quality
+    signals, quality = result.signals, result.signals.quality
     found = ["The log is cut off or damaged: a part of it is missing."] if quality.truncated else []
     if quality.dropped_samples:
         lost = f", {quality.lost_in_files} of them lost in damaged files" if quality.lost_in_files else ""
-        found.append(f"{quality.dropped_samples} samples were not used{lost}.")
+        blank = {(o.file, o.channel): f"{o.symbol} {o.not_finite}" for o in signals.origins.values() if o.not_finite}
+        told = f"; without a value: {listed(list(blank.values()), 4)}" if blank else ""
+        found.append(f"{quality.dropped_samples} samples were not used{lost}{told}.")
     if quality.time_jumps:
         found.append(f"The time jumps {'once' if quality.time_jumps == 1 else f'{quality.time_jumps} times'}.")
     return list(dict.fromkeys([*found, *quality.notes, *without_remarks(result.notes, result.checks)]))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aqualog.core.judgement import Episode, Judgement
 from aqualog.report.drive.report import drive_page
 from aqualog.report.page import write_page
 from aqualog.report.theme import EVENT_SHADE, FULL_SHADE, OTHER_SHADE
@@ -86,6 +87,16 @@ def visible_groups(browser):
 @pytest.fixture(scope="module")
 def short():
     return fake.make_result()
+
+
+def test_each_line_of_the_verdict_stands_on_its_own(show, short):
+    wet = Episode(
+        "aquaplaning", 8.0, 9.0, ("fr",), "f", None, "partial", 28.0, ("joint_criteria",), 0.5, -0.1, 0.0, 28.0, ()
+    )
+    judged = Judgement("aquaplaning", (), ("margin",), (wet, replace(wet, start_s=12.0, end_s=13.0)), 24.0)
+    browser = show(replace(short, judgement=judged))
+    tops = browser.execute_script("return [...document.querySelectorAll('#verdict li')].map(x => x.offsetTop)")
+    assert len(set(tops)) == len(tops) >= 3
 
 
 def test_plots_are_drawn_without_errors_or_requests(show, short):

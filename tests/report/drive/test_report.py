@@ -196,6 +196,10 @@ def test_problems_are_in_a_box(short):
     words = Reader(drive_page(cut, title="t")).words
     assert "The log is cut off or damaged: a part of it is missing." in words
     assert "9 samples were not used, 4 of them lost in damaged files." in words
+    blank = {"omega_fl": replace(short.signals.origins["omega_fl"], not_finite=300)}
+    origins = {**short.signals.origins, **blank}
+    words = Reader(drive_page(replace(short, signals=replace(short.signals, origins=origins)), title="t")).words
+    assert "5 samples were not used; without a value: omega_fl 300." in words
     good = replace(short, signals=replace(short.signals, quality=Quality()))
     assert 'id="problems"' not in drive_page(good, title="t")
 
