@@ -71,9 +71,9 @@ def format_of(formats: Mapping[str, CsvFormat], file: str) -> CsvFormat:
     return next(own, formats.get("*", CsvFormat()))
 
 
-def csv_hint(*keys: str) -> str:
-    """How to say it."""
-    examples = {"separator": 'separator = ";"', "decimal": 'decimal = ","', "encoding": 'encoding = "cp1252"'}
+def csv_hint(*keys: str, encoding: str = "cp1252") -> str:
+    """How to say it, with an `encoding` that is likely."""
+    examples = {"separator": 'separator = ";"', "decimal": 'decimal = ","', "encoding": f'encoding = "{encoding}"'}
     return f"say it in a signal map: [csv] {' '.join(examples[k] for k in keys)}"
 
 

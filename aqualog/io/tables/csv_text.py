@@ -273,13 +273,17 @@ def _code_page(raw: bytes, path: Path) -> LogText:
     notes: tuple[str, ...] = ()
     if not usable or _known_units(beyond, best) == 0:
         best = _guessed(beyond, usable)
-        notes = (f"{path.name}: does not declare its encoding; taken as {best} ({csv_hint('encoding')})",)
+        # the first one that reads these bytes alike is the more frequent one: ä and ß are the same in cp1252 and cp1250
+        best = next((c for c in usable if beyond.decode(c) == beyond.decode(best)), best)
+        notes = (
+            f"{path.name}: does not declare its encoding; taken as {best} ({csv_hint('encoding', encoding=best)})",
+        )
     try:
         return LogText(raw.decode(best).encode(), best, notes)
     except UnicodeDecodeError as error:  # a byte that the code page does not have, somewhere behind the head
         line = raw.count(b"\n", 0, error.start) + 1
         note = f"{path.name}: is {best}, but not everywhere (first at line {line}); taken as latin-1"
-        return LogText(raw.decode("latin-1").encode(), "latin-1", (f"{note} ({csv_hint('encoding')})",))
+        return LogText(raw.decode("latin-1").encode(), "latin-1", (f"{note} ({csv_hint('encoding', encoding=best)})",))
 
 
 def _known_units(beyond: bytes, encoding: str) -> int:

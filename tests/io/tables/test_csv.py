@@ -491,6 +491,10 @@ def test_an_encoding_that_is_said(read):
 
 def test_an_encoding_that_is_guessed_is_told_with_the_way_to_say_it(read):
     assert read("t;Größe\n" + table(separator=";"), "cp1252").noted("taken as", '[csv] encoding = "cp1252"')
+    german = "Zeit [s];Längsbeschleunigung [g]\n" + table(separator=";")
+    assert read(german, "cp1252").noted("taken as cp1252", '[csv] encoding = "cp1252"')
+    russian = "t;скорость колеса и угол поворота\n" + table(separator=";")
+    assert read(russian, "cp1251").noted("taken as cp1251", '[csv] encoding = "cp1251"')
     odd = ("t;v [°C]\n" + table(8000, ";")).encode("cp1252") + b"99;\x81\n"
     assert read(odd).noted("is cp1252, but not everywhere (first at line 8002); taken as latin-1")
 
