@@ -28,8 +28,8 @@ from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term
 
 __all__ = [
-    "CHUNK", "SHAPE_PRIOR", "TOLERATED", "Arena", "Field", "Part", "arena_of", "blocks_of", "competing", "known_only",
-    "make_arena", "products", "unit_force",
+    "CHUNK", "SHAPE_PRIOR", "TOLERATED", "Arena", "Field", "Part", "arena_of", "blocks_of", "by_drives",
+    "competing", "known_only", "make_arena", "products", "unit_force",
 ]  # fmt: skip
 
 # of an effect at any place, of a shape of a mechanism, and of a road that is not even, on one drive (K)
@@ -240,6 +240,12 @@ def competing(parts: Sequence[Part], drives: Sequence[Drive]) -> tuple[str, ...]
     left = [d.name for i, d in enumerate(drives) if i not in there]
     most = f"the longest, up to {MOST_BLOCKS * 0.1 / 60.0:.0f} min together, decide between the causes"
     return (f"Of these drives {most}; left out: {', '.join(left)}.",) if left else ()
+
+
+def by_drives(parts: Sequence[Part], given: int) -> str:
+    """The begin of a verdict that does not stand on all of the given drives; else empty."""
+    used = len({p.drive for p in parts})
+    return f"By {used} of {given} drives: " if used < given else ""
 
 
 def blocks_of(evidence: Evidence, made: Sequence[Shape]) -> tuple[tuple[Block, ...], FloatArray]:

@@ -16,7 +16,7 @@ from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, contradicted, widened
 from aqualog.diagnose.any_effect import SURROGATES
-from aqualog.diagnose.arena import competing
+from aqualog.diagnose.arena import by_drives, competing
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
@@ -161,7 +161,7 @@ def _diagnosed(
     gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
     outcome = _by_gain(outcome, gained, frozenset(c.effect for c in (*seen.causes, *late.causes)))
     p, reason = found.significance.p_value, f" ({short_form(forms[0])})" if forms else ""
-    sentence = verdict_sentence(
+    sentence = by_drives(found.arena.parts, len(drives)) + verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
         seen=p if p <= options.level else None, untested=untested | seen.untested,
         moved=bare.terms[len(with_known(given, vehicle).terms) :],

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aqualog.diagnose.arena import Part, arena_of, competing
+from aqualog.diagnose.arena import Part, arena_of, by_drives, competing
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import hypotheses, residual, signatures
 from aqualog.diagnose.search import simulated
@@ -66,6 +66,8 @@ def test_drives_that_do_not_compete_are_said():
     (note,) = competing(parts, drives)
     assert note.endswith("up to 20 min together, decide between the causes; left out: b.")
     assert competing([*parts, replace(parts[0], drive=1)], drives) == ()
+    assert by_drives(parts, 3) == "By 2 of 3 drives: "
+    assert by_drives(parts, 2) == ""
 
 
 def test_a_ramp_and_two_intervals_are_where_they_are():

@@ -61,6 +61,14 @@ def keys(d):
     return {c.key for c in d.causes}
 
 
+def test_the_first_sentence_says_how_many_drives_it_stands_on(monkeypatch):
+    logs = [(n, noisy(term("payload_mass", delta_mass=200.0), seed=k)) for k, n in enumerate("ab")]
+    monkeypatch.setattr(arena, "MOST_BLOCKS", 1 + round(logs[0][1].duration_s / 0.1))
+    d = diagnose(logs, CAR, options=QUICK)
+    assert d.sentence.startswith("By 1 of 2 drives: The car ")
+    assert any("left out: " in n for n in d.notes)
+
+
 def test_no_effect():
     d, _ = watched()
     assert d.verdict == "no_effect"

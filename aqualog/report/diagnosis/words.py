@@ -93,7 +93,7 @@ def sentences(document: Mapping[str, Any]) -> dict[str, list[str]]:
         "caution": [document["caution"]] if document.get("caution") else [],
         "headline": [_headline(document)],
         "test": _test(document["significance"]),
-        "causes": [c["sentence"] for c in document["causes"] if c["sentence"] not in ("", document["sentence"])],
+        "causes": [c["sentence"] for c in document["causes"] if not document["sentence"].endswith(c["sentence"])],
         "alternatives": [_alternative(a) for a in document["alternative_sets"]],
         "relations": _alike(document["isolability"], causes),
         "relation_sizes": _relations(sorted(document["isolability"], key=lambda c: not _parties(c) & causes)),
