@@ -224,7 +224,7 @@ def _compared(
         found = log.read(log.channels())
     compared: list[Quantity] = []
     left_out: dict[str, AqualogError] = {}
-    for name in (p.name for p in drive.paths):
+    for name in (p.name for p in drive.paths if p.name not in log.goes_on):
         own = [c for (file, _), c in found.items() if file == name]
         try:
             compared.append(
@@ -237,7 +237,8 @@ def _compared(
                 raise
             left_out[name] = error
     if len(compared) < 2:
-        raise next(iter(left_out.values()))
+        one = SignalError("parts of one recording, on one clock", where=drive.name, expected="another logger's file")
+        raise next(iter(left_out.values()), one)
     return compared, left_out
 
 

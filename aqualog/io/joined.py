@@ -79,7 +79,7 @@ def split_of(
     clocks = [next((p for p in patterns if fnmatchcase(f.name, p) or f.stem == p), "") for f in paths]
     kinds: list[list[int]] = []
     for i, own in enumerate(channels):
-        kind = next((k for k in kinds if _are_alike(channels[k[0]], own) and clocks[i] in ("", clocks[k[0]])), None)
+        kind = next((k for k in kinds if _are_alike(channels[k[0]], own)), None)
         if kind is None:
             kinds.append([i])
         else:
@@ -96,6 +96,8 @@ def split_of(
         pauses.append(())
         for before, after in pairwise(order):
             pause, reason = _pause(spans[before], spans[after])
+            if clocks[after] not in ("", clocks[chains[-1][0]]):
+                reason = reason or "the signal map gives {after} a clock of its own"
             if reason:
                 apart = apart or reason.format(before=paths[before].name, after=paths[after].name)
                 chains.append((after,))

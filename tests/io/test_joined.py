@@ -104,9 +104,12 @@ def test_without_a_date(tmp_path):
 
 def test_a_file_with_a_clock_of_its_own_in_the_map_is_no_part(tmp_path):
     parts = [mf4(tmp_path / f"{n}.mf4", at, at + 20.0) for n, at in (("a", 0.0), ("b", 20.0))]
-    with pytest.raises(SignalError, match="separate drives"):
+    with pytest.raises(SignalError, match=r"the signal map gives b\.mf4 a clock of its own"):
         load(*parts, signal_map=SignalMap(clocks={"b": SourceClock(offset_s=3.0)}))
-    load(*parts, signal_map=SignalMap(clocks={"*.mf4": SourceClock(offset_s=3.0)}))
+    for pattern in ("*.mf4", "a"):  # that of the first part holds for all
+        joined = load(*reversed(parts), signal_map=SignalMap(clocks={pattern: SourceClock(offset_s=3.0)}))
+        assert joined.duration_s == pytest.approx(40.0)
+        assert joined.start_ns == START_NS - 3 * 10**9
 
 
 def test_inspect_shows_the_recording_once(tmp_path):
@@ -114,3 +117,9 @@ def test_inspect_shows_the_recording_once(tmp_path):
     found = aq.inspect(parts)
     assert {o.file for o in found.overviews} == {"a.mf4"}
     assert "b.mf4: MDF, goes on with a.mf4" in found.text()
+
+
+def test_align_takes_a_recording_as_one_source(tmp_path):
+    parts = [mf4(tmp_path / f"{n}.mf4", at, at + 20.0) for n, at in (("a", 0.0), ("b", 20.0))]
+    with pytest.raises(SignalError, match="parts of one recording, on one clock"):
+        aq.align(parts)
