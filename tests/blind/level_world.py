@@ -8,6 +8,7 @@ is never exactly right, not even where nothing is hidden.
 
 import math
 from dataclasses import dataclass, field
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -202,13 +203,10 @@ def _inverse_curve(force, slope, peak):
 
 
 def _ou(rng, v, dt, length):
-    x = np.empty(v.size)
-    noise = rng.standard_normal(v.size)
-    x[0] = noise[0]
-    for i in range(1, v.size):
-        keep = math.exp(-float(v[i]) * dt / length)
-        x[i] = keep * x[i - 1] + math.sqrt(1.0 - keep * keep) * noise[i]
-    return x
+    keep, own = np.exp(-v * dt / length), rng.standard_normal(v.size)
+    own[1:] *= np.sqrt(1.0 - keep[1:] ** 2)
+    steps = zip(keep.tolist(), own.tolist(), strict=True)
+    return np.array(list(accumulate(steps, lambda x, step: step[0] * x + step[1], initial=0.0)))[1:]
 
 
 def _smooth(x, width):

@@ -6,7 +6,7 @@ from math import exp, pi, sin, tanh
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, part
 
 from .dynamics import (
     A_X,
@@ -160,7 +160,7 @@ def drive_along(target, coast, lateral, unrest, wander, gust, fine, slow, p, odd
     return rows
 
 
-@compiled
+@part
 def slow_film(slow, column, way):
     """Film at the nearest metre [m]."""
     return slow[min(max(int(way + 0.5), 0), slow.shape[0] - 1), column]

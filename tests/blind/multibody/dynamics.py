@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, exp, pi, sin, tanh
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import part
 
 from .tyre import load_factor, lost_share, tmeasy, water_push
 
@@ -25,7 +25,7 @@ GRADE, BANK, FILM_L, FILM_R = range(4)  # columns of the slow road, every metre
 FINE, COARSE = 0.1, 1.0  # [m] steps of the uneven and of the slow road
 
 
-@compiled
+@part
 def at(x, column, s, ds):
     """Value of a column at a way, linear between."""
     k = s / ds
@@ -38,13 +38,13 @@ def at(x, column, s, ds):
     return x[j, column] + (k - j) * (x[j + 1, column] - x[j, column])
 
 
-@compiled
+@part
 def _bell(x, centre, width):
     z = (x - centre) / width
     return exp(-0.5 * z * z)
 
 
-@compiled
+@part
 def odd_force(t, share, v, way, steer, torque, a_side, yaw, a_x, is_open, odd):
     """Forces against the motion that no effect has [N]; `share` of the drive that is over, `torque` of all shafts."""
     F = 0.0
@@ -79,7 +79,7 @@ def odd_force(t, share, v, way, steer, torque, a_side, yaw, a_x, is_open, odd):
     return F * tanh(v / 0.5)
 
 
-@compiled
+@part
 def _vertical(y, f, aux, fine, p):
     """Springs, dampers, bars; fills loads and the accelerations of the unsprung masses, returns forces on the body."""
     lift_up, moment_y, moment_x = 0.0, 0.0, 0.0
@@ -109,7 +109,7 @@ def _vertical(y, f, aux, fine, p):
     return lift_up, moment_y, moment_x
 
 
-@compiled
+@part
 def _driveline(y, f, aux, drive, gear, p):
     """Engine or motor of each axle, shafts with backlash; fills the wheels' torques."""
     for a in range(2):
@@ -128,14 +128,14 @@ def _driveline(y, f, aux, drive, gear, p):
         aux[T_SHAFT + 2 * a + 1] = 0.5 * T
 
 
-@compiled
+@part
 def _slope(i, t, y, aux, leak, lost, p, odd, linger):
     slope = p.slope[i] * load_factor(aux[LOAD + i], p.load_ref[i], p.load_law[i])
     slope *= exp(p.slope_drift[i] * t) * (1.0 + p.leak_slope[i] * leak) * (1.0 - lost) ** p.law[9]
     return slope * odd_slope(i, aux[T_SHAFT + i], y[YAW], y[VX], y[WAY], linger, aux[SLIP + i], odd)
 
 
-@compiled
+@part
 def odd_slope(i, torque, yaw, v, way, linger, slip, odd):
     """Factor on the slope of wheel i that no effect has; `torque` of its shaft."""
     factor = 1.0 - odd.soft[0] * linger
@@ -153,7 +153,7 @@ def odd_slope(i, torque, yaw, v, way, linger, slip, odd):
     return factor / (1.0 + odd.talc[0] * abs(torque) * v / 1e4)
 
 
-@compiled
+@part
 def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, linger):
     up, moment_y, moment_x = _vertical(y, f, aux, fine, p)
     _driveline(y, f, aux, drive, gear, p)
@@ -250,7 +250,7 @@ def _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, ling
     aux[A_Y] = a_side + G * y[ROLL]
 
 
-@compiled
+@part
 def advance(t, share, y, f, before, aux, fine, slow, p, odd, drive, brake, gear, steer, gust, linger, braked):
     """One step; `before` are the derivatives of the last step, `braked` (4,) gets the brakes' torques [N m]."""
     _rhs(t, share, y, f, aux, fine, slow, p, odd, drive, gear, steer, gust, linger)

@@ -9,7 +9,7 @@ from math import sqrt
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import part
 
 __all__ = ["LAW", "load_factor", "lost_share", "tmeasy", "water_push"]
 
@@ -22,7 +22,7 @@ AQUA_H = 1.2e-3  # [m] of an even film
 LAW = np.array([33.0, 0.16, 0.25, 0.3, 0.72, 0.0, 0.0, 1.0, 2.0, 2.0])
 
 
-@compiled
+@part
 def tmeasy(s_x, s_y, F_z, mu, slope_x, slope_y):
     """Forces along and across [N] of slips; slopes are dF/ds / F_z at the origin."""
     if F_z <= 1.0 or mu <= 1e-4:
@@ -51,13 +51,13 @@ def tmeasy(s_x, s_y, F_z, mu, slope_x, slope_y):
     return F * F_z * e_x / norm, F * F_z * e_y / norm
 
 
-@compiled
+@part
 def load_factor(F_z, F_ref, law):
     """Slope over that at the reference load: Rill's parabola of the force's slope over the load, divided by the load."""
     return max(1.0 + law * (F_z / F_ref - 1.0), 0.2)
 
 
-@compiled
+@part
 def lost_share(v, film, F_z, F_ref, law):
     """Share of the contact that a film [m] lifts, 0 to 1; `law` as `LAW`."""
     if film < 2e-5:
@@ -69,7 +69,7 @@ def lost_share(v, film, F_z, F_ref, law):
     return lost * min(film / 1.5e-4, 1.0)
 
 
-@compiled
+@part
 def water_push(v, film, law):
     """Drag of a film on one wheel [N]: momentum of what 0.19 m of tread push aside, a part of it thrown."""
     if law[6] > 0.0:

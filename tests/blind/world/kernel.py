@@ -203,9 +203,7 @@ def drive_car(target, ability, unrest, wander, gust, road, ds, p, w, style, refi
     y[VX] = target[0]
     for i in range(4):
         y[OMEGA + i] = target[0] / w[i, R_E]
-    f1, f2, f3, f4 = np.zeros(N), np.zeros(N), np.zeros(N), np.zeros(N)
-    z = np.zeros(N)
-    row = np.zeros(_WIDTH)
+    f, total, z = np.zeros(N), np.zeros(N), np.zeros(N)
     rows = np.zeros((n, _WIDTH))
     base = p[L_F] + p[L_R]
     weight = p[HABIT_M] * G
@@ -279,22 +277,18 @@ def drive_car(target, ability, unrest, wander, gust, road, ds, p, w, style, refi
             t = k * DT + j * h
             a, b, e = drive + j * d_drive, brake + j * d_brake, steer + j * d_steer
             g = gust[k] + (gust[k + 1] - gust[k]) * j / steps
-            m, q, r = a + 0.5 * d_drive, b + 0.5 * d_brake, e + 0.5 * d_steer
-            keep = j == 0
-            stiffest = max(stiffest, _rhs(t, y, f1, row, keep, p, w, road, ds, a, b, e, g))
-            if keep:
-                for c in range(row.size):  # an assignment of arrays compiles a message about shapes, for 3 s
-                    rows[k, c] = row[c]
+            for stage in range(4):  # one call: its code is compiled once
+                x = 0.0 if stage == 0 else 1.0 if stage == 3 else 0.5
+                for i in range(N):
+                    z[i] = y[i] + x * h * f[i] if stage > 0 else y[i]
+                keep = j == 0 and stage == 0
+                stiff = _rhs(
+                    t + x * h, z, f, rows[k], keep, p, w, road, ds, a + x * d_drive, b + x * d_brake, e + x * d_steer, g
+                )  # fmt: skip
+                for i in range(N):
+                    total[i] = f[i] if stage == 0 else total[i] + (2.0 if stage < 3 else 1.0) * f[i]
+                stiffest = max(stiffest, stiff) if stage == 0 else stiffest
             for i in range(N):
-                z[i] = y[i] + 0.5 * h * f1[i]
-            _rhs(t + 0.5 * h, z, f2, row, False, p, w, road, ds, m, q, r, g)
-            for i in range(N):
-                z[i] = y[i] + 0.5 * h * f2[i]
-            _rhs(t + 0.5 * h, z, f3, row, False, p, w, road, ds, m, q, r, g)
-            for i in range(N):
-                z[i] = y[i] + h * f3[i]
-            _rhs(t + h, z, f4, row, False, p, w, road, ds, a + d_drive, b + d_brake, e + d_steer, g)
-            for i in range(N):
-                y[i] += h / 6.0 * (f1[i] + 2.0 * f2[i] + 2.0 * f3[i] + f4[i])
+                y[i] += h / 6.0 * total[i]
         drive, brake, steer = next_drive, foot, hands
     return rows
