@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, plain
 from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = ["LineWatch", "kept_values", "line_watch_of"]
@@ -82,7 +82,7 @@ class LineWatch:
     def _add(self, t: TimeArray, x: FloatArray, edges: TimeArray) -> None:
         """Take the blocks between edges (b + 1,) of samples, with the one sample behind them if there is one."""
         start = edges[:-1]
-        after, off, changes, turns, finest = _measured(t, x, edges)
+        after, off, changes, turns, finest = _measured(*plain(t, x, edges))
         self._finest = min(self._finest, finest)
         self._kept.append(_Block(t[start], x[start], t[after], x[after], off, np.diff(edges), changes, turns))
 

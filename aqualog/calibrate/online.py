@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, plain
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.features.smoothing import gain
 
@@ -138,8 +138,5 @@ def scan(
     Thesis: 2.2 asks for a separate estimator of mass and rolling resistance on dry road and gives no method. This one
     estimates their joint effect at even traction only.
     """
-    found: tuple[FloatArray, OnlineState] = _scan(
-        p, state, np.ascontiguousarray(x, dtype=np.float64), np.ascontiguousarray(v_x, dtype=np.float64),
-        np.ascontiguousarray(frozen, dtype=np.bool_),
-    )  # fmt: skip
+    found: tuple[FloatArray, OnlineState] = _scan(p, state, *plain(x, v_x, frozen))
     return found

@@ -13,13 +13,15 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
+import numpy as np
 from numba import config, njit
 from numba.core.options import DefaultOptions
 from numba.core.runtime import rtsys
+from numpy.typing import NDArray
 
 from aqualog.core.user_folders import code_folder
 
-__all__ = ["compiled", "inlined", "kept_code", "load_kept", "part"]
+__all__ = ["compiled", "inlined", "kept_code", "load_kept", "part", "plain"]
 
 _PATIENCE_S = 120.0  # the longest compilation takes a quarter of it on a slow machine
 _LOOK_S = 0.05
@@ -67,6 +69,11 @@ def part(function: Callable[..., Any], *, is_inline: bool = True, allocates: boo
     the time of a simulation.
     """
     return njit(function, error_model="numpy", forceinline=is_inline, **({} if allocates else _UNCOUNTED))
+
+
+def plain(*arrays: Any) -> list[NDArray[Any]]:
+    """Return arrays as one machine code takes them all: contiguous and writable, copied where they are not."""
+    return [np.require(x, None, ["C", "W"]) for x in arrays]
 
 
 def kept_code() -> frozenset[tuple[str, int]]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, plain
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
@@ -172,8 +172,8 @@ class BrakeWatch:
         push = sum(columns[f"torque_{w}"] / vehicle.arm(w) for w in WHEELS if f"torque_{w}" in columns) / vehicle.mass
         self._pressed = self._pressed.copy()
         found = _unlogged(
-            vehicle.rolling_resistance * G, gain(TAU_RELEASED, self._dt), self._dt, self._pressed, pressure, push,
-            f["delta_a_x"],
+            vehicle.rolling_resistance * G, gain(TAU_RELEASED, self._dt), self._dt, self._pressed,
+            *plain(pressure, push, f["delta_a_x"]),
         )  # fmt: skip
         return np.asarray(found)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, plain
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.features.smoothing import gain
 
@@ -99,8 +99,5 @@ def scan(
 
     Thesis: section 2.3: a drop on snow, ice and gravel does not depend on the speed, that on water does (C57).
     """
-    out, mean, proved, dry, is_on = _scan(
-        p, *state, np.ascontiguousarray(x), np.ascontiguousarray(v_x), np.ascontiguousarray(dropped),
-        np.ascontiguousarray(loss),
-    )  # fmt: skip
+    out, mean, proved, dry, is_on = _scan(p, *state, *plain(x, v_x, dropped, loss))
     return out, OtherState(mean, proved, dry, allowed=bool(is_on))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, plain
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.arena import SHAPE_PRIOR, Arena
 from aqualog.diagnose.channels import contrasts
@@ -132,18 +132,18 @@ def _patches(name: str, x: FloatArray, weights: FloatArray, scores: FloatArray) 
         return [None] * len(weights)
     rates = np.arange(*AGAIN, AGAIN_STEP)
     where = np.zeros((len(weights), 3))
-    _fold(x, rates, np.ascontiguousarray(weights), np.ascontiguousarray(scores), where)
+    _fold(x, float(x.min()), float(x.max()), rates, *plain(weights, scores), where)
     tried = rates.size * PHASES * (PHASES // 2)
     return beside(lambda s: _patch(name, x, *s, tried), zip(weights, scores, where.tolist(), strict=True))
 
 
 @compiled
-def _fold(x, rates, weights, scores, where):  # type: ignore[no-untyped-def]
+def _fold(x, low, high, rates, weights, scores, where):  # type: ignore[no-untyped-def]
     """Fill start, length and period of the patch that explains most, for each row of weights and scores (k, n)."""
-    low, best = x.min(), np.zeros(len(weights))
+    best = np.zeros(len(weights))
     at = np.empty(x.size, dtype=np.int64)
     for f in rates:
-        period = (x.max() - low) / f
+        period = (high - low) / f
         for t in range(x.size):
             turns = (x[t] - low) / period
             at[t] = int((turns - np.floor(turns)) * PHASES)
@@ -161,7 +161,11 @@ def _fold(x, rates, weights, scores, where):  # type: ignore[no-untyped-def]
                     gain = (b - a / total * right) ** 2 / max(a * (1.0 - a / total), 1e-9 * total)
                     if gain > best[k]:
                         best[k] = gain
-                        where[k] = low + i / PHASES * period, (j + 1) / PHASES * period, period
+                        where[k, 0], where[k, 1], where[k, 2] = (
+                            low + i / PHASES * period,
+                            (j + 1) / PHASES * period,
+                            period,
+                        )
 
 
 def _patch(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, plain
 from aqualog.core.records import BoolArray, FloatArray
 
 __all__ = [
@@ -187,7 +187,7 @@ def whitened(x: FloatArray, noise: Noise, used: BoolArray | None = None) -> Floa
     out = np.empty((*x.shape[:-1], kept.size))
     shares = np.diff(np.pad(-noise.taps[:, [a for a, _ in _BLOCKS]], [(0, 0), (1, 1)]))
     weights = np.broadcast_to(noise.weights, x.shape[1:])
-    _whiten(np.ascontiguousarray(x), noise.rotation, shares, weights, noise.shaping, kept, out)
+    _whiten(*plain(x, noise.rotation, shares, weights, noise.shaping, kept), out)
     return out.reshape(len(x), -1)
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, plain
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.noise import Noise, bridged, fit_noise, good_size, whitened
 from aqualog.diagnose.threads import beside
@@ -63,7 +63,7 @@ class Weighing:
             own = x[i : i + CHUNK]
             flat = whitened(bridged(own, self.mask), self.noise, self.used).reshape(*own.shape[:2], -1)
             lines = np.fft.rfft(flat, self.size)[..., : self.inverse.shape[3]]
-            _unrelated(lines, self.inverse, out[i : i + CHUNK].reshape(len(own), 2, *lines.shape[1:]))
+            _unrelated(*plain(lines, self.inverse), out[i : i + CHUNK].reshape(len(own), 2, *lines.shape[1:]))
 
         beside(fill, range(0, len(x), CHUNK))
         return out

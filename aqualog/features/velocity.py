@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, plain
 from aqualog.core.records import FloatArray
 from aqualog.features.smoothing import gain
 
@@ -249,6 +249,6 @@ def observe(
     """
     kappa, age = state.kappa.copy(), state.age.copy()
     velocity, acceleration, corrected, motion = _scan(
-        p, state[:5], kappa, age, v_ref, np.ascontiguousarray(v_w), weights, a_x, a_y, yaw_rate
+        p, state[:5], kappa, age, *plain(v_ref, v_w, weights, a_x, a_y, yaw_rate)
     )
     return velocity, acceleration, corrected, VelocityState._make((*motion, kappa, age))

@@ -183,6 +183,15 @@ def test_the_stamp_is_what_kept_code_is_looked_up_by():
         assert kernel._cache._cache_file._source_stamp[1] == compilation._stamp_of(kernel.py_func)
 
 
+def test_read_only_and_strided_arrays_need_no_machine_code_of_their_own():
+    x = np.arange(8.0)
+    p = velocity.params_from_seconds(0.1, has_accelerometer=True)
+    for a in (x, np.broadcast_to(x, 8), np.repeat(x, 2)[::2]):
+        smoothing.lowpass(a, smoothing.UNSET, tau=1.0, dt=0.1)
+        velocity.observe(p, velocity.initial_state(), a, np.array([a] * 4), a, a, a, weights=np.ones(4))
+    assert [len(f.nopython_signatures) for f in (smoothing._lowpass, velocity._scan)] == [1, 1]
+
+
 def test_the_median_of_the_wheels_is_numpys():
     rng = np.random.default_rng(0)
     for k in range(500):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, plain
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect.slip_slope.history import KEPT_PERIODS, Period, Rule
 
@@ -161,8 +161,5 @@ def scan(
     """
     loss, refs = np.empty_like(slope), np.empty_like(slope)
     bits = np.zeros(slope.size, dtype=np.bool_)
-    last = _scan(
-        p, state, np.ascontiguousarray(slope), np.ascontiguousarray(slope_sd), np.ascontiguousarray(is_valid),
-        np.ascontiguousarray(alarm), loss, bits, refs,
-    )  # fmt: skip
+    last = _scan(p, state, *plain(slope, slope_sd, is_valid, alarm), loss, bits, refs)
     return loss, bits, refs, last

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.compiled import compiled
+from aqualog.core.compiled import compiled, plain
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.detect import cusum
 from aqualog.detect.slip_slope import ekf
@@ -275,8 +275,5 @@ def scan(
     """
     out = np.empty((11, s_delta.size))
     sums = cusum.CusumParams(p.zeta, p.h, math.inf, p.dt)
-    last = _scan(
-        p, sums, state, np.ascontiguousarray(s_delta, dtype=np.float64), np.ascontiguousarray(mu_i, dtype=np.float64),
-        np.ascontiguousarray(rho_mu_j, dtype=np.float64), np.ascontiguousarray(is_active, dtype=np.bool_), out,
-    )  # fmt: skip
+    last = _scan(p, sums, state, *plain(s_delta, mu_i, rho_mu_j, is_active), out)
     return Estimate(*out), last

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aqualog.core.compiled import compiled, inlined
+from aqualog.core.compiled import compiled, inlined, part, plain
 from aqualog.core.records import FloatArray
 from aqualog.model.plant import flat
 from aqualog.model.term import Setup
@@ -73,10 +73,8 @@ def respond(setups: Sequence[Setup], which: NDArray[np.int64], wet: NDArray[np.b
                 lane.depth_left, lane.depth_right, lane.irregularity_left, lane.irregularity_right,
                 s.scenario.water_scatter,
             )  # fmt: skip
-    found = _respond(
-        driven.v, driven.a, np.ascontiguousarray(driven.mu), which, wet, cars, wheels.reshape(-1, 4), lanes, _points(),
-        _table(),
-    )  # fmt: skip
+    seen = tuple(plain(driven.v, driven.a, driven.mu, which, wet))
+    found = _respond(seen, cars, wheels.reshape(-1, 4), lanes, _points(), _table())
     return Response(*found)
 
 
@@ -88,7 +86,7 @@ _FIELD_SHARE = float(np.sqrt(0.5))  # half of the contact's variance comes from 
 _CONTACT_STEP, _SHARE_STEP, _SHARE_MAX = float(_CONTACT[1]), float(_SHARE[1]), float(_SHARE[-1])
 
 
-@compiled
+@part
 def _slip(mu, F_z, L, friction, q, table):  # type: ignore[no-untyped-def]
     """Slip of the shortened brush at a traction. [-] NaN where the contact cannot carry it."""
     carried = friction * _friction_ratio(L)
@@ -103,14 +101,13 @@ def _slip(mu, F_z, L, friction, q, table):  # type: ignore[no-untyped-def]
     return mu * bent / (q.slip_slope * _load_factor(F_z, q.F_z_ref, q.load_sensitivity) * L * L)
 
 
-@compiled
-def _respond(v, a, traction, which, wet, cars, wheels, lanes, points, table):  # type: ignore[no-untyped-def]
-    n, nodes = v.size, points.shape[0]
-    slip, slip_variance, contact_mean, lost = np.zeros((4, n)), np.zeros((4, n)), np.ones((4, n)), np.zeros((4, n))
-    resistance, resistance_variance = np.zeros(n), np.zeros(n)
-    force = np.zeros(nodes)
-    left = np.zeros(nodes)
-    for m in range(n):
+@part
+def _fill(driven, cars, wheels, lanes, points, table, out, room):  # type: ignore[no-untyped-def]
+    v, a, traction, which, wet = driven
+    slip, slip_variance, contact_mean, lost, resistance, resistance_variance = out
+    force, left = room  # what a part makes itself has its references counted
+    nodes = points.shape[0]
+    for m in range(v.size):
         k = which[m]
         p = cars[k]
         loads = _loads(a[m], 0.0, p.mass, p.l_f, p.l_r, p.h_cg, p.track)
@@ -163,7 +160,15 @@ def _respond(v, a, traction, which, wet, cars, wheels, lanes, points, table):  #
         if wet[m]:
             resistance[m] = force.mean() / (p.mass + p.towed_mass)
             resistance_variance[m] = force.var() / (p.mass + p.towed_mass) ** 2
-    return slip, slip_variance, contact_mean, lost, resistance, resistance_variance
+
+
+@compiled
+def _respond(driven, cars, wheels, lanes, points, table):  # type: ignore[no-untyped-def]
+    n, nodes = driven[0].size, points.shape[0]
+    slip, slip_variance, contact_mean, lost = np.zeros((4, n)), np.zeros((4, n)), np.ones((4, n)), np.zeros((4, n))
+    out = (slip, slip_variance, contact_mean, lost, np.zeros(n), np.zeros(n))
+    _fill(driven, cars, wheels, lanes, points, table, out, (np.zeros(nodes), np.zeros(nodes)))
+    return out
 
 
 @lru_cache(maxsize=1)
