@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.core.compiled import compiled, plain
+from aqualog.core.compiled import compiled, part, plain
 from aqualog.core.records import FloatArray
 from aqualog.features.smoothing import gain
 
@@ -64,7 +64,7 @@ def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams
     return VelocityParams(dt, k_v, k_v / tau_b, has_accelerometer, 0.7, 0.02, 30.0, 3.0, 0.5, 2.0)
 
 
-@compiled
+@part
 def _step(p, motion, kappa, age, v_ref, w, weights, a_x, a_y, yaw_rate):  # type: ignore[no-untyped-def]
     """Process one sample: `motion` is (v, b, a, lost, v_y); `kappa`, `age`, `w` are the caller's, changed in place.
 
@@ -141,7 +141,7 @@ def _step(p, motion, kappa, age, v_ref, w, weights, a_x, a_y, yaw_rate):  # type
     return (v, b, a, lost, v_y), (v if is_seen else math.nan), (a if is_seen else math.nan)
 
 
-@compiled
+@part
 def _learn_radii(p, kappa, age, w, v, has_reference):  # type: ignore[no-untyped-def]
     """Update the radius corrections while the car rolls steadily."""
     mean = 0.0
@@ -161,7 +161,7 @@ def _learn_radii(p, kappa, age, w, v, has_reference):  # type: ignore[no-untyped
             kappa[i] -= mean / count
 
 
-@compiled
+@part
 def _median(w):  # type: ignore[no-untyped-def]
     """Return the median of the known wheels, by how many lie below each: called per sample, so nothing is allocated."""
     n = 0

@@ -201,15 +201,15 @@ def flat(plant: Plant, **scalars: float) -> tuple[Any, Any, FloatArray]:
     `scalars` of the run go into the record of the car. Records are plain memory; a tuple of arrays would cost reference
     counting at every access.
     """
-    fields = plant._asdict()
-    wheels = {n: np.asarray(x, dtype=np.float64) for n, x in fields.items() if np.shape(x) == (4,)}
-    car = {n: float(x) for n, x in fields.items() if np.ndim(x) == 0} | scalars
+    fields = [(name, x, getattr(x, "shape", ())) for name, x in plant._asdict().items()]
+    wheels = {name: x for name, x, shape in fields if shape == (4,)}
+    car = {name: x for name, x, shape in fields if not shape} | scalars
     return records(car, 1), records(wheels, 4), np.ascontiguousarray(plant.drag_over_v)
 
 
 def records(columns: Mapping[str, Any], n: int) -> Any:
     """Return `n` records of these float columns."""
-    out = np.zeros(n, dtype=[(name, np.float64) for name in columns])
-    for name, x in columns.items():
-        out[name] = x
-    return out
+    out = np.empty((n, len(columns)))
+    for i, x in enumerate(columns.values()):
+        out[:, i] = x
+    return out.view([(name, np.float64) for name in columns]).reshape(n)
