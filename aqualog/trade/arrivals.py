@@ -66,7 +66,7 @@ class Arrivals:
             before = self._seen.get(path)
             if before is None or before[0] != state:
                 before = self._seen[path] = state, now
-            if state.size and now - before[1] >= self.settle_s:
+            if now - before[1] >= self.settle_s:
                 complete.append((path, state))
             else:
                 growing.append(path)

@@ -105,10 +105,13 @@ class Watching:
         if known is not None and now >= due:
             self._contents.known.clear()  # the same size and time: only the content says whether it is the same
             self._again[path] = now + min(2.0 * waited, MOST_S), min(2.0 * waited, MOST_S)
+        digest = f"no content: {path}"  # an empty or unreadable log is nobody's copy; measuring it says why
         try:
-            digest = self._contents.of(path)
-        except OSError:  # away again: the next look finds it
+            digest = self._contents.of(path) if state.size else digest
+        except FileNotFoundError:  # away again: the next look finds it
             return
+        except OSError:
+            pass
         if known is not None and known[1] != digest:
             self._again.pop(path, None)
         self._digests[path] = state, digest

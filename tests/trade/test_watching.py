@@ -165,6 +165,26 @@ def test_damaged_logs_are_named_and_others_go_on(track, stock):
     assert len(track.measured) == 3  # the same content is not tried again
 
 
+def test_empty_and_unreadable_logs_are_named_after_the_usual_time(track, stock, monkeypatch):
+    track.put("a.parquet", b"")
+    track.put("x.parquet", b"")
+    track.look()
+    assert track.look(SETTLE_S - 0.5)[1].failed == {}
+    _, found = track.look(0.5)
+    assert [x.partition("; ")[0] for x in problems(found)[1:]] == ["a.parquet: is empty", "x.parquet: is empty"]
+    assert (found.same, found.look.growing, len(found.missing)) == ({}, (), 3)
+    assert "74.0 km/h, valid" in track.settle("a.parquet", stock[0])[0][0]
+
+    def refused(*_, **__):
+        raise PermissionError(13, "Permission denied", "b.parquet")
+
+    with monkeypatch.context() as m:
+        m.setattr(watching.Contents, "of", refused)
+        m.setattr("aqualog.trade.logs.load_signals", refused)
+        assert track.settle("b.parquet", stock[1])[1].failed["b.parquet"] == "b.parquet: Permission denied"
+    assert "75.0 km/h, valid" in track.look(AGAIN_S)[0][0]
+
+
 def test_the_same_log_twice_counts_once(track, stock):
     track.settle("copy of it.parquet", stock[0])
     _, found = track.settle("a.parquet", stock[0])
@@ -316,6 +336,9 @@ def test_once(tmp_path, stock, monkeypatch):
     assert done.exit_code == 3
     assert commands.one_error_line(done).startswith("error: b.parquet: ")
     assert done.stdout.startswith("a.parquet: 74.0 km/h, valid")
+    track.put("b.parquet", b"")
+    done = commands.run(*given)
+    assert (done.exit_code, commands.one_error_line(done)) == (3, "error: b.parquet: is empty; expected a log")
     (tmp_path / "mine.html").write_text("mine")
     refused = commands.one_error_line(commands.run(*given, "-o", tmp_path / "mine.html"))
     assert refused.endswith("mine.html: exists already. Try: another name for the page")
