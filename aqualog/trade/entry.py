@@ -12,11 +12,13 @@ from aqualog.trade.curve import CurvePass
 from aqualog.trade.onset import Onset
 from aqualog.trade.straight import StraightRun
 
-__all__ = ["KMH", "Entry", "Kind", "Record"]
+__all__ = ["KMH", "UNPLANNED", "Entry", "Kind", "Record"]
 
 Kind = Literal["straight", "curve", "braking"]
 Record = StraightRun | CurvePass | Stop
 KMH = 3.6  # [km/h per m/s]
+UNPLANNED: Group = (("x_run", "in no run of the campaign"),)
+"""The set of logs that no run names: nobody has said that their tyre is that of a planned set."""
 
 
 @dataclass(frozen=True, slots=True)

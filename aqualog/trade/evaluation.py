@@ -11,12 +11,12 @@ import numpy as np
 from aqualog.campaign.bins import Group, group_of
 from aqualog.campaign.definition import Campaign
 from aqualog.core.errors import ConfigError
-from aqualog.core.intervals import student_quantile
+from aqualog.core.intervals import Interval, student_quantile
 from aqualog.trade.braking import Stop
 from aqualog.trade.control import Block, Control, Drift, Estimate, Index, blocks_of, index_of
 from aqualog.trade.curve import CurvePass
 from aqualog.trade.curve_set import CurveResult, CurveSet, common_speeds, curve_set
-from aqualog.trade.entry import Entry, Kind, Record
+from aqualog.trade.entry import UNPLANNED, Entry, Kind, Record
 from aqualog.trade.grip import Coefficients, wet_grip_index
 from aqualog.trade.limits import Limits
 from aqualog.trade.logs import Measured
@@ -264,12 +264,19 @@ def _of_curves(test: TradeTest, groups: Mapping[Group, Sequence[int]]) -> TradeT
 
     own = [e.tyre == options.control and bool(options.control) for e in test.entries]
     in_a_row = blocks_of([e.order for e in test.entries], own)
-    between = common_speeds([passes(m) for m in [*groups.values(), *in_a_row]], limits)
+    planned = [m for g, m in groups.items() if g != UNPLANNED]
+    between = common_speeds([passes(m) for m in [*planned, *in_a_row]], limits)
 
-    def summary(members: Sequence[int]) -> CurveSet:
-        return curve_set(passes(members), limits, result=options.result, between=between)
+    def summary(members: Sequence[int], over: Interval = between) -> CurveSet:
+        return curve_set(passes(members), limits, result=options.result, between=over)
 
-    rows = [SetRow(g, tuple(m), _is_control(test.entries, m, options), curve=summary(m)) for g, m in groups.items()]
+    def row(group: Group, members: Sequence[int]) -> SetRow:
+        over = common_speeds([passes(members)], limits) if group == UNPLANNED else between
+        return SetRow(
+            group, tuple(members), _is_control(test.entries, members, options), curve=summary(members, over)
+        )  # fmt: skip
+
+    rows = [row(g, m) for g, m in groups.items()]
 
     def made(blocks: Sequence[Sequence[int]]) -> tuple[list[Block], bool]:
         sets = [(b, summary(b)) for b in blocks]

@@ -13,6 +13,7 @@ from aqualog.campaign.jobs import Configured
 from aqualog.guard.worker import Crashed
 from aqualog.io.fingerprint import Contents, hash_of, state_of
 from aqualog.trade.arrivals import Arrivals, Look, State
+from aqualog.trade.entry import UNPLANNED
 from aqualog.trade.evaluation import Options, TradeTest, entries_of, evaluated
 from aqualog.trade.logs import Measured, Request, measure_log
 
@@ -160,7 +161,7 @@ class Watching:
     def _key(self, drive: Arrived) -> str:
         runs = [r if isinstance(r, str) else repr(replace(r, logs=())) for r in self._runs_of(drive)]
         cars = [repr(v) for v in self._configured.vehicles.values()]
-        return hash_of([*(self._digests[p][1] for p in drive.paths), *runs, *cars])
+        return hash_of([*(self._digests[p][1] for p in drive.paths), str(bool(drive.runs)), *runs, *cars])
 
     def _measure(self, drive: Arrived, key: str, do: Do) -> bool:
         """Measure a drive; False where it was no longer what was hashed: it grows on, or is away."""
@@ -203,12 +204,13 @@ class Watching:
                     failed[name] = str(outcome)
         campaign = self._configured.campaign
         entries = entries_of(replace(campaign, runs=tuple(runs)), names, measured, self._options.keys)
+        unplanned = tuple(self._name(d.paths[0]) for d in drives if not d.runs)
+        entries = tuple(replace(e, group=UNPLANNED) if e.log in unplanned else e for e in entries)
         own = {p for d in drives for p in d.paths}
         digests = {self._digests[p][1]: self._name(p) for p in own}
         came = {i for d in drives if self._name(d.paths[0]) not in failed for i in d.runs}
         return Watched(
             evaluated(entries, self._options, failed), look, new, failed,
             {self._name(p): digests[x] for p, (_, x) in self._digests.items() if p not in own and x in digests},
-            tuple(r for i, r in enumerate(campaign.runs) if i not in came),
-            tuple(self._name(d.paths[0]) for d in drives if not d.runs),
+            tuple(r for i, r in enumerate(campaign.runs) if i not in came), unplanned,
         )  # fmt: skip

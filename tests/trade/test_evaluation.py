@@ -17,7 +17,7 @@ from aqualog.report.trade.figures import trade_figures
 from aqualog.report.trade.sections import headline, trade_report
 from aqualog.trade.braking import Stop
 from aqualog.trade.curve import CurvePass
-from aqualog.trade.entry import Entry
+from aqualog.trade.entry import UNPLANNED, Entry
 from aqualog.trade.evaluation import Options, check_control, entries_of, evaluated
 from aqualog.trade.grip import Coefficients
 from aqualog.trade.limits import Limits, defaults, described
@@ -276,6 +276,11 @@ def test_curve_document_and_index():
     assert set(d["sets"][1]) >= {"value", "ci95", "index", "index_ci95", "v_half_kmh", "v_zero_kmh", "v_greatest_kmh"}
     assert "4.00" in report_text(trade_report(test))
     json.dumps(d, allow_nan=False)
+    fast = entries(("", [replace(p, v_entry=p.v_entry + 5.0) for p in passes(0)]))
+    fast = [replace(e, group=UNPLANNED, order=e.order + 99.0) for e in fast]
+    mixed = evaluated((*test.entries, *fast), options)  # a log that no run names leaves the planned sets as they are
+    assert (mixed.between, mixed.sets[1].curve.result) == (test.between, a.curve.result)
+    assert mixed.sets[2].curve.result == pytest.approx(3.5)
 
 
 @pytest.mark.parametrize("kind", ["straight", "curve", "braking"])

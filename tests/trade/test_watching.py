@@ -14,6 +14,7 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.vehicle import vehicle_toml
 from aqualog.face import watch as face
 from aqualog.face.campaign_inputs import CampaignInputs
+from aqualog.face.trade import TyreTest
 from aqualog.report.trade.watching import problems, run_lines, status, watch_page
 from aqualog.trade import watching
 from aqualog.trade.arrivals import Arrivals
@@ -266,9 +267,28 @@ def test_a_process_that_ends_is_one_log(track, stock):
     assert "75.0 km/h" in track.look()[0][0]
 
 
+@pytest.mark.parametrize("plan", [("a,Alpha", "b,Alpha"), ("a,", "b,"), ("a,", "b,Alpha")])
+def test_a_log_that_no_run_names_is_in_no_mean_of_a_planned_set(tmp_path, stock, plan):
+    """Runs of one tyre are one set, and so are runs without a tyre; a stray log may have any."""
+    track = Track(tmp_path, plan)
+    for name, data in (("x17", stock[5]), ("a", stock[0]), ("b", stock[1])):
+        track.settle(f"{name}.parquet", data)
+    assert [len(s.members) for s in track.last.test.sets if s.group == watching.UNPLANNED] == [1]
+    assert sum(len(s.members) for s in track.last.test.sets) == 3
+    own = Options("straight", defaults(), ())
+    track.watching.reconfigured(CampaignInputs(track.base / "campaign.toml").configured, own)
+    _, found = track.look(1.0)
+    assert [round(s.summary.mean, 1) for s in found.test.sets] == [79.0, 74.5]
+    row = TyreTest(found.test, "monday").document["sets"][0]
+    assert (row["x_run"], row["tyre"]) == ("in no run of the campaign", None)
+    track.plan(*plan, "x17,")
+    track.watching.reconfigured(CampaignInputs(track.base / "campaign.toml").configured, own)
+    assert track.look(1.0)[0][0].startswith("x17.parquet: 79.0 km/h, valid; all runs: valid: 3 of 3")
+
+
 def test_logs_that_no_run_names_and_runs_to_come(track, stock):
     lines, found = track.settle("x17.parquet", stock[0])
-    assert "74.0 km/h, valid" in lines[0]
+    assert lines == ["x17.parquet: 74.0 km/h, valid; in no run of the campaign: valid: 1 of 1"]
     assert found.unplanned == ("x17.parquet",)
     assert "in no run of the campaign: x17.parquet" in problems(found)
     assert "still missing: 3 planned runs" in status(found)

@@ -13,7 +13,7 @@ from aqualog.report.page import report_page
 from aqualog.report.sections import Figures, Headline, Lines, Report, Section
 from aqualog.report.trade.sections import run_name, trade_report
 from aqualog.report.values import counted
-from aqualog.trade.entry import Entry
+from aqualog.trade.entry import UNPLANNED, Entry
 from aqualog.trade.evaluation import SetRow, TradeTest
 from aqualog.trade.watching import Watched
 
@@ -65,7 +65,7 @@ def set_sentence(row: SetRow, watched: Watched) -> str:
     least = {"straight": limits.set.runs, "braking": limits.braking.runs, "curve": limits.curve.passes}[options.kind]
     planned = sum(_group(r, row.group) == row.group for r in watched.missing)
     missing = [counted(planned, "planned run")] if planned else []
-    if valid + planned < least:
+    if valid + planned < least and row.group != UNPLANNED:
         missing.append(f"{int(least) - valid - planned} more valid ({least:g} are needed)")
     return "; ".join([*parts, *([f"still missing: {' and '.join(missing)}"] if missing else [])])
 
