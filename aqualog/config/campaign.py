@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import os
 import re
+import unicodedata
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, time
@@ -98,6 +100,7 @@ def read_campaign(path: Path) -> CampaignFile:
         place = f"{path.name}: line {heads[index]}" if len(heads) == len(tables) else path.name
         found.append(_Read(_run(table, named, vehicle), table, place))
     _check_twice(found)
+    _check_spelling(found)
     runs = _beside(path.parent, texts["runs"]) if texts["runs"] else None
     if runs is not None:
         try:
@@ -176,6 +179,7 @@ def _from_table(path: Path, named: _NamedFiles, vehicle: Path | None) -> list[_R
         table_row = Row(known, faults, line)
         found.append(_Read(_run(table_row, named, vehicle), table_row, f"{path.name}: line {line}"))
     _check_twice(found)
+    _check_spelling(found)
     faults.raise_if_any()
     return found
 
@@ -302,6 +306,23 @@ class _NamedFiles:
         except ConfigError as error:
             table.add(key, f"{key} = {name[:80]!r}: {error.line()}")
         return path
+
+
+def _check_spelling(found: Sequence[_Read]) -> None:
+    """Note tyres that differ from a more frequent one in case, blanks and hyphens only: they would be sets apart."""
+    named = [(str(r.run.values["tyre"]), r) for r in found if r.run is not None and "tyre" in r.run.values]
+    count = Counter(name for name, _ in named)
+    usual = {_folded(name): name for name, _ in reversed(count.most_common())}
+    for name, one in named:
+        if name != (other := usual[_folded(name)]):
+            told = f'another tyre differs in case, blanks or hyphens only (did you mean "{other[:80]}"?)'
+            one.table.add("tyre", f"tyre = {name[:80]!r}: {told}")
+
+
+def _folded(name: str) -> str:
+    """Return a name without case, blanks and hyphens; between two digits one stays: 1-1 and 11 are two tyres."""
+    plain = unicodedata.normalize("NFKC", name).casefold()
+    return re.sub(r"(?<!\d)[\s_-]+|[\s_-]+(?!\d)", "", re.sub(r"[\s_-]+", " ", plain))
 
 
 def _check_twice(found: Sequence[_Read]) -> None:

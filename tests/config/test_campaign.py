@@ -284,6 +284,9 @@ def test_tables_of_spreadsheets_say_the_same(folder, data):
      ("log,tyre,tyre\na,1,s\n", ["column tyre stands twice"]),
      ('log,x_a\n"a\n.mf4",1\nb.mf4,2,3\n', ["line 2: log = ", "line 4: 3 cells"]), ('log\n"a\n', ["is not CSV"]),
      ("PK\x03\x04", ["is a spreadsheet"]), ("log\n\0\n", ["is not text"]),
+     ("log,tyre\na,Worn_Summer\nb,worn_summer\nc,worn_summer\nd,worn summer\ne,Worn_Summer\nf,Q 1-1\ng,Q-11\nh,worn_summer\ni,\n",
+      ["lines 2, 6: tyre = 'Worn_Summer': another tyre differs in case, blanks or hyphens only (did you mean "
+       '"worn_summer"?); line 5: tyre = \'worn summer\': another tyre differs in case, blanks or hyphens only (']),
      ("log,lane_start_s,lane_end_s\na,-9,-1\n", ["lane_end_s = -1 is before the log's first sample"])],
 )  # fmt: skip
 def test_faults_of_tables(folder, table, parts):
