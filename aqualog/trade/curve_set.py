@@ -44,7 +44,7 @@ class CurveSet:
         The number of `RESULTS` with its interval, and the same with its variance.
     v_greatest, v_half, v_zero : (value, interval)
         Speed of the greatest mean acceleration, speeds at which the least one is half of the dry one, and 0. [m/s] NaN
-        where the passes do not reach that.
+        where the passes do not reach that; an end of `v_greatest` is infinite where it lies beyond the speeds driven.
     passes, valid : int
     notes : tuple of str
     """
@@ -128,7 +128,7 @@ def curve_set(
     dof = float(good.v.size - v.size)
     return CurveSet(
         v, *curves, good.means(good.dry), own[0], interval(0), Estimate(own[0], float(spread[0]) ** 2, dof),
-        (own[1], interval(1)), (own[2], interval(2)), (own[3], interval(3)), len(passes), int(good.v.size),
+        _within(v, own[1], interval(1)), (own[2], interval(2)), (own[3], interval(3)), len(passes), int(good.v.size),
         _notes(good, v, own, between, limits, is_low=bool(curves[0][0] <= 0.5 * good.means(good.dry)[0])),
     )  # fmt: skip
 
@@ -193,6 +193,16 @@ def _top(v: FloatArray, mean: FloatArray) -> float:
     return float(v[k] + np.clip(-0.5 * slope / bend, *ends)) if bend < 0.0 else float(v[k])
 
 
+def _within(v: FloatArray, top: float, ci: Interval) -> tuple[float, Interval]:
+    """Return the speed of the greatest acceleration and its interval: what lies at an end of the speeds is open there.
+
+    The greatest of the driven speeds is at an end where the curve still rises beyond it: a bound, and no speed.
+    """
+    low, high = ci
+    ends = -math.inf if low <= v[0] else low, math.inf if high >= v[-1] else high
+    return (top if v[0] < top < v[-1] else math.nan), ends
+
+
 def _draws(good: _Steps, v: FloatArray, limits: CurveLimits, result: CurveResult, between: Interval) -> FloatArray:
     """Return what is read from each bootstrap draw (b, 4); empty where no step has two passes."""
     steps = np.unique(good.step)
@@ -227,7 +237,7 @@ def _notes(
     *, is_low: bool,
 ) -> tuple[str, ...]:  # fmt: skip
     """What a reader must know; `is_low`: the slowest passes have less than half of the dry lateral acceleration."""
-    notes, slow = [], f"{3.6 * v[0]:.0f} km/h"
+    notes, (slow, fast) = [], (f"{3.6 * x:.0f} km/h" for x in (v[0], v[-1]))
     few = [f"{s:g} km/h" for s in np.unique(good.step) if (good.step == s).sum() < limits.passes]
     if few:
         notes.append(f"fewer than {limits.passes:g} passes at {', '.join(few)}")
@@ -235,12 +245,11 @@ def _notes(
         notes.append("the sets have no speed in common")
     elif between[1] <= between[0]:
         notes.append("the sets have one speed in common: no area")
-    if v.size > 1 and own[1] == v[0]:
-        notes.append(
-            f"the mean lateral acceleration is greatest in the slowest passes, {slow}: slower ones may have more"
-        )
+    if v.size > 1 and own[1] in (v[0], v[-1]):
+        where = f"slowest passes, {slow}: slower" if own[1] == v[0] else f"fastest passes, {fast}: faster"
+        notes.append(f"the mean lateral acceleration is greatest in the {where} ones may have more")
     if is_low:
         notes.append(f"the least lateral acceleration is below half of the dry one from {slow} on")
     if not math.isfinite(own[3]):
-        notes.append(f"the least lateral acceleration does not reach 0 up to {3.6 * v[-1]:.0f} km/h")
+        notes.append(f"the least lateral acceleration does not reach 0 up to {fast}")
     return tuple(notes)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from aqualog.report.trade.sections import _speed_text
 from aqualog.trade.concave import area_under, concave_fit, falls_to, nonnegative
 from aqualog.trade.curve import CurvePass, curve_passes
 from aqualog.trade.curve_set import common_speeds, curve_set
@@ -124,11 +125,27 @@ def test_the_greatest_lies_between_steps():
     assert low < top < high
 
 
+@pytest.mark.parametrize(
+    ("top", "told"),
+    [(50.0, "≤ 60.0"), (90.0, "≥ 80.0"), (61.5, "≤ 62.9"), (63.5, "63.5 (open … 64.4)"), (76.5, "76.5 (75.7 … open)")],
+)
+def test_the_greatest_at_an_end_is_a_bound(top, told):
+    def at(v, k):
+        mean = 3.0 - 0.01 * (v - top) ** 2 + 0.1 * k
+        return CurvePass(v * KMH, 8.0, mean - 0.5, mean, 100.0)
+
+    found = curve_set(
+        [at(v, k) for v in (60.0, 65.0, 70.0, 75.0, 80.0) for k in (-1, 0, 1)], LIMITS, result="mean",
+        between=(60 * KMH, 80 * KMH),
+    )  # fmt: skip
+    assert _speed_text(*found.v_greatest) == told
+    assert any("ones may have more" in n for n in found.notes) == math.isnan(found.v_greatest[0])
+
+
 def test_set_by_hand():
     made = curve_set(passes(), LIMITS, result="mean", between=(60 * KMH, 80 * KMH))
     assert made.valid == made.passes == 18
     assert made.result == pytest.approx(3.0)  # mean of 5 ... 1
-    assert made.v_greatest[0] / KMH == pytest.approx(60.0)
     assert made.v_zero[0] / KMH == pytest.approx(79.0)  # 0.2 m/s² counts as 0
     # half of dry: least 2.0 at 70 and 1.0 at 75 km/h, half of dry 1.8904 and 2.1701 there
     assert made.v_half[0] / KMH == pytest.approx(70.0 + 5.0 * 0.1096 / (0.1096 + 1.1701), abs=0.01)

@@ -139,7 +139,7 @@ CURVE = _document(
         f.interval("ci95", "", "95 % interval, bootstrap over passes; null without one", null=True),
         *(
             end for n, what in (
-                ("v_greatest", "speed of the greatest mean lateral acceleration"),
+                ("v_greatest", "speed of the greatest mean lateral acceleration; open beyond those driven"),
                 ("v_half", "speed at which the least lateral acceleration is half of the dry one"),
                 ("v_zero", "speed at which the least lateral acceleration is 0"),
             )

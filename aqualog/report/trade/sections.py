@@ -169,12 +169,15 @@ def _mean_text(speeds: Sequence[float]) -> str:
 
 
 def _curve_cells(c: CurveSet) -> list[str | Cell]:
-    speeds = (c.v_greatest, c.v_half, c.v_zero)
-    told = [
-        f"{KMH * v:.1f}" + (f" ({_ends(ci, 1, KMH)})" if math.isfinite(ci[0]) else "") if math.isfinite(v) else "–"
-        for v, ci in speeds
-    ]
+    told = [_speed_text(*x) for x in (c.v_greatest, c.v_half, c.v_zero)]
     return [f"{c.valid} of {c.passes}", number(c.result, 2), _ends(c.ci, 2), *told]
+
+
+def _speed_text(v: float, ci: Interval) -> str:
+    low, high = ci
+    if math.isfinite(v):
+        return f"{KMH * v:.1f}" + (f" ({_ends(ci, 1, KMH)})" if math.isfinite(low) or math.isfinite(high) else "")
+    return f"≥ {KMH * low:.1f}" if math.isfinite(low) else f"≤ {KMH * high:.1f}" if math.isfinite(high) else "–"
 
 
 def _legend(test: TradeTest) -> str:
