@@ -331,6 +331,10 @@ def _with_index(
     orders = [entries[i].order for i in row.members if entries[i].valid]
     if not orders or not math.isfinite(row.estimate.value):
         return replace(row, index_note="no mean, so no index")
+    own = sum(entries[i].tyre == options.control for i in row.members)
+    if own:  # one would be compared with the other as if the runs that both share were independent
+        held = f"{own} of {len(row.members)} runs are on {options.control} itself"
+        return replace(row, index_note=f"{held}: no index. Try: sets by tyre")
     blocks = control.control.blocks
     notes = [] if is_same else [f"{options.control} was driven in another configuration"]
     if len(blocks) > 1 and (min(orders) < blocks[0].order or max(orders) > blocks[-1].order):

@@ -185,6 +185,15 @@ def test_no_valid_run_of_the_control():
     assert "no valid run of the control C: no index" in test.notes
 
 
+def test_a_set_that_holds_runs_of_the_control_is_not_compared_with_it():
+    both = [replace(e, group=(("wear", "new"),)) for e in entries(("C", [run(80.0), run(80.4)]), ("A", [run(79.0)]))]
+    worn = [replace(e, group=(("wear", "worn"),), order=9.0) for e in entries(("B", [run(70.0), run(70.2)]))]
+    test = evaluated((*both, *worn), Options("straight", defaults(), ("wear",), "C"))
+    new, other = test.sets
+    assert (new.index, new.index_note) == (None, "2 of 3 runs are on C itself: no index. Try: sets by tyre")
+    assert other.index.control == pytest.approx(80.2)
+
+
 def test_one_control_set_is_held_constant():
     test = straight(("C", [run(80.0), run(80.4)]), ("A", [run(80.0), run(81.0), run(80.2)]), control="C")
     assert "its drift is not known" in test.notes[0]
