@@ -24,12 +24,13 @@ __all__ = ["evaluation_document", "evaluation_report"]
 _LEGEND = (
     "Full: detected within 0.5 s of the beginning; partial: within 2 s.\n"
     "Latency 50 / 95 %: over all partial episodes, `never` where more episodes are missed.\n"
-    "Before: the detector was already on, on the same water.\n"
+    "Before: of full / of partial the detector was already on, on the same water.\n"
     "On water: events with contact above 0.7, counted neither as right nor as wrong."
 )
 _SCORES = (
     "Detector", "Drives", ("Full within 0.5 s", "full"), ("Partial within 2 s", "partial"),
-    ("Partial, its wheels", "its wheels"), ("Latency 50 / 95 % [s]", "50 / 95 % s"), ("Warned before [%]", "before %"),
+    ("Partial, its wheels", "its wheels"), ("Latency 50 / 95 % [s]", "50 / 95 % s"),
+    ("Already on before: full / partial [%]", "before %"),
     "False alarms", ("Per hour (95 %)", "per h (95 %)"), "Per 100 km", ("On water, contact above 0.7", "on water"),
 )  # fmt: skip
 _ROC = ("Detector", "Times", "Threshold", "Full", "Partial", "False alarms", ("Per hour (95 %)", "per h (95 %)"))
@@ -127,7 +128,7 @@ def _score_rows(scores: Mapping[str, score.Score]) -> list[tuple[str | Cell, ...
             words.recall_text(s.partial),
             words.recall_text(s.wheel_partial),
             f"{words.seconds_text(s.partial.latency(0.5))} / {words.seconds_text(s.partial.latency(0.95))}",
-            number(100.0 * s.partial.before_share, 0),
+            " / ".join(number(100.0 * r.before_share, 0) for r in (s.full, s.partial) if r.episodes) or "–",
             str(s.false_alarms.count),
             words.rate_text(s.false_alarms),
             number(s.false_alarms.per_100km),

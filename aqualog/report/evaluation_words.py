@@ -117,13 +117,18 @@ def _against(s: score.Score) -> str:
 
 def _did(s: score.Score) -> str:
     parts = [
-        f"found {recall_text(r)} of {effect} aquaplaning within {LIMITS_S[effect]:g} s"
+        f"found {recall_text(r)} of {effect} aquaplaning within {LIMITS_S[effect]:g} s{_already_on(r)}"
         for effect, r in (("full", s.full), ("partial", s.partial))
         if r.episodes
     ]
     hours = s.false_alarms.seconds / score.HOUR_S
     parts.append(f"raised {s.false_alarms.count} false alarms in {hours:.3g} h outside water")
     return ", ".join(parts)
+
+
+def _already_on(r: score.Recall) -> str:
+    """` (3 already on before)`: what was on for something else does not show that a detector knows this effect."""
+    return f" ({'all' if r.before == r.found else r.before} already on before)" if r.before else ""
 
 
 def _merit(s: score.Score) -> tuple[int, float, float]:

@@ -54,3 +54,13 @@ def test_heat_maps_stand_before_tables_and_columns_without_a_value_are_left_out(
     assert page.count("<table") == 3
     assert "Full within" not in page.split('id="scores"')[1].split("</table>")[0]
     assert report_text(report).count("(1 drive)") == 40
+
+
+def test_what_was_on_before_an_episode_is_said_beside_what_was_found():
+    early, late = (Hit(found=True, latency=0.1 * (not x), before=x) for x in (True, False))
+    run = DetectorRun(full=(early, early), partial=(late, early, late), wheel_partial=(late,))
+    one = RunRecord("a.mf4", {}, 600.0, 500.0, 1e4, 5.0, {"joint_criteria": run})
+    text = report_text(evaluation_report(Evaluation((one,), DEFAULT, None)))
+    assert "found 2/2 (100 %) of full aquaplaning within 0.5 s (all already on before), " in text
+    assert "found 3/3 (100 %) of partial aquaplaning within 2 s (1 already on before), raised" in text
+    assert "100 / 33" in text
