@@ -124,7 +124,7 @@ def doctor(run: Run, out: Path | None) -> Output:
 def convert(run: Run, out: Path, decimal_comma: bool) -> Output:
     """Write the aligned signals of one drive as one log, in SI units and with canonical names.
 
-    What is written needs no signal map any more.
+    What is written needs no signal map any more. Without one the channels are guessed, as `detect` does, and said.
 
     \b
     Examples:
@@ -133,14 +133,18 @@ def convert(run: Run, out: Path, decimal_comma: bool) -> Output:
       aqualog convert drive.mcap -o drive.csv --decimal-comma --rate 50
     """
     from aqualog.core.errors import ExitCode
-    from aqualog.face.drive import check_target, convert
+    from aqualog.face.drive import check_target, convert, vehicle_of
+    from aqualog.face.guess import load_or_guess
 
     check_target(out, decimal_comma=decimal_comma)
     drive = run.drive([out])
     with run.hearing() as hear:
+        with drive.reading():
+            drive, _, guessed = load_or_guess(drive, vehicle_of(None, drive), hear, whole_for="writing a log")
         convert(drive, out, decimal_comma=decimal_comma, force=True, progress=hear)
     signals, changes, quality = drive.signals, drive.changes(), drive.signals.quality
     notes = [
+        *guessed,
         *([] if run.vehicle or drive.vehicle is None else _of_default_car(signals, drive.vehicle)),
         *quality.notes,
         *changes,

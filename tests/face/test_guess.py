@@ -30,6 +30,14 @@ def test_detect_without_a_map_is_detect_with_the_proposed_one_and_says_so(by_map
     assert not any(n.startswith("no signal map") for n in by_map.document["quality"]["notes"])
 
 
+def test_convert_guesses_as_detect_does_and_says_so(by_map, tmp_path):
+    done = run("convert", GERMAN, "--vehicle", CAR, "-o", tmp_path / "c.parquet")
+    assert done.exit_code == 0, done.stderr
+    assert "no signal map: 12 signals are guessed from names, units and data (" in done.stderr
+    made = aq.detect(tmp_path / "c.parquet", CAR, samples=False)
+    assert [e["wheel"] for e in made.document["events"]] == [e["wheel"] for e in by_map.document["events"]]
+
+
 def test_units_that_the_log_does_not_give_are_guessed_too(by_map, tmp_path):
     heading, _, rows = GERMAN.read_text(encoding="utf-8").partition("\n")
     bare = ";".join(cell.split(" [")[0] if i else cell for i, cell in enumerate(heading.split(";")))
