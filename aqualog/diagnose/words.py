@@ -11,9 +11,20 @@ from aqualog.core.units import displayed_unit
 from aqualog.diagnose.records import SURE, Cause, Estimate
 from aqualog.model.term import Effect, Term
 
-__all__ = ["PLACES", "cause_sentence", "listed", "name_of", "place", "quantity", "term_words", "verdict_sentence"]
+__all__ = [
+    "CERTAIN",
+    "PLACES",
+    "cause_sentence",
+    "listed",
+    "name_of",
+    "place",
+    "quantity",
+    "term_words",
+    "verdict_sentence",
+]
 
 MANY_UNTESTED = 5  # more than those of water, which no dry road shows
+CERTAIN = "Certain: "  # how a sentence begins that knows some causes, where others cannot be distinguished
 PLACES = {
     "fl": "front left wheel", "fr": "front right wheel", "rl": "rear left wheel", "rr": "rear right wheel",
     "f": "front axle", "r": "rear axle", "left": "left side", "right": "right side",
@@ -125,8 +136,8 @@ def verdict_sentence(
             others = listed(open_ones, "or")
             if len(open_ones) == 1:
                 odds = _odds(causes[is_sure.index(False)].probability)
-                return f"Certain: {listed(sure)}. This {source} leaves open: {others}{odds}."
-            return f"Certain: {listed(sure)}. This {source} cannot distinguish the other causes: {others}."
+                return f"{CERTAIN}{listed(sure)}. This {source} leaves open: {others}{odds}."
+            return f"{CERTAIN}{listed(sure)}. This {source} cannot distinguish the other causes: {others}."
         if len(causes) == 1 and not sure:
             odds = _odds(causes[0].probability)
             return f"The car may differ from the model, but this {source} does not make it certain: {names[0]}{odds}."

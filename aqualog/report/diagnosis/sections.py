@@ -60,7 +60,7 @@ def diagnosis_report(
         ("Gain", said["score"]),
         ("Next", said["manoeuvre"] if d["verdict"] != "cannot_tell" else []),  # there it has a section
     ]
-    head = Headline(said["headline"][0], [(k, x[0]) for k, x in answers if x], verdict_title(d["verdict"]))
+    head = Headline(said["headline"][0], [(k, x[0]) for k, x in answers if x], verdict_title(d))
     level = percent(d["criteria"]["interval"])
     settle = Section("What would settle it" if d["verdict"] == "cannot_tell" else "Next drive", [
         Lines(said["manoeuvre"]),

@@ -8,6 +8,7 @@ from typing import Any
 
 from aqualog.diagnose.shapes import MECHANISMS
 from aqualog.diagnose.unknown_term import COORDINATES
+from aqualog.diagnose.words import CERTAIN
 from aqualog.report.values import interval_text, percent, pretty_unit, short, upper_first
 from aqualog.report.wording import detector_name
 
@@ -41,8 +42,13 @@ _WHEELS = ("fl", "fr", "rl", "rr")
 _MOST_CONFUSED = 12
 
 
-def verdict_title(verdict: str) -> str:
-    """The verdict in words."""
+def verdict_title(document: Mapping[str, Any]) -> str:
+    """The verdict in words, those of the sentence below: what is certain is no cause that cannot be distinguished."""
+    verdict = document["verdict"]
+    if verdict == "cannot_tell" and str(document["sentence"]).startswith(CERTAIN):
+        return "Some causes are certain, others are open"
+    if verdict == "cannot_tell" and len(document["causes"]) == 1:
+        return "A cause that is not certain"
     return _VERDICTS.get(verdict, verdict.replace("_", " "))
 
 
@@ -325,7 +331,7 @@ def chance(probability: float | None) -> str:
 
 def _headline(document: Mapping[str, Any]) -> str:
     """The verdict's sentence with the probability of each cause, and of the first unknown form."""
-    said: str = document["sentence"] or f"{verdict_title(document['verdict'])}."
+    said: str = document["sentence"] or f"{verdict_title(document)}."
     forms = document["unexplained"][:1] if document["verdict"] == "unexplained" else []
     known = {cause_title(c): chance(c.get("probability")) for c in document["causes"]}
     if forms:

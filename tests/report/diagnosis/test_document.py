@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from aqualog.diagnose.records import Estimate
+from aqualog.diagnose.words import verdict_sentence
 from aqualog.report.diagnosis.document import diagnosis_document
 from aqualog.report.diagnosis.sections import diagnosis_report
 from aqualog.report.diagnosis.words import effect_title, sentences
+from aqualog.report.page import report_page
 from aqualog.report.text import report_text
 from aqualog.report.values import interval_text, measured, ordinary, percent, short
 from tests.report.diagnosis_case import BASE, HOSTILE, IMAGE, MASS, NAN, RADIUS, cases, numbers_in, remainder
@@ -358,6 +360,19 @@ def test_what_would_settle_it_stands_beneath_the_verdict():
     titles = [s.title for s in diagnosis_report(document_of("cannot_tell")).sections if s.title]
     assert titles[0] == "What would settle it"
     assert "What would settle it" not in [s.title for s in diagnosis_report(document_of("named")).sections]
+
+
+@pytest.mark.parametrize(
+    ("causes", "certain", "title"),
+    [((MASS, RADIUS), {"payload_mass"}, "Some causes are certain, others are open"),
+     ((MASS, RADIUS), set(), "Causes that this log cannot distinguish"),
+     ((MASS,), set(), "A cause that is not certain")],
+)  # fmt: skip
+def test_the_small_head_says_what_the_sentence_says(causes, certain, title):
+    said = verdict_sentence("cannot_tell", causes, level=0.05, certain=frozenset(certain))
+    head = report_page(diagnosis_report(document_of("cannot_tell", causes=causes, sentence=said)), title="d")
+    assert title in head
+    assert (title == "Causes that this log cannot distinguish") == ("Causes that this log cannot" in head)
 
 
 def test_untested_effects_are_grouped_by_reason():
