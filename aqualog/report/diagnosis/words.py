@@ -44,7 +44,7 @@ _MOST_CONFUSED = 12
 
 def verdict_title(document: Mapping[str, Any]) -> str:
     """The verdict in words, those of the sentence below: what is certain is no cause that cannot be distinguished."""
-    verdict = document["verdict"]
+    verdict: str = document["verdict"]
     if verdict == "cannot_tell" and str(document["sentence"]).startswith(CERTAIN):
         return "Some causes are certain, others are open"
     if verdict == "cannot_tell" and len(document["causes"]) == 1:
