@@ -270,13 +270,10 @@ def _of_curves(test: TradeTest, groups: Mapping[Group, Sequence[int]]) -> TradeT
     def summary(members: Sequence[int], over: Interval = between) -> CurveSet:
         return curve_set(passes(members), limits, result=options.result, between=over)
 
-    def row(group: Group, members: Sequence[int]) -> SetRow:
-        over = common_speeds([passes(members)], limits) if group == UNPLANNED else between
-        return SetRow(
-            group, tuple(members), _is_control(test.entries, members, options), curve=summary(members, over)
-        )  # fmt: skip
-
-    rows = [row(g, m) for g, m in groups.items()]
+    rows = []
+    for g, m in groups.items():
+        over = common_speeds([passes(m)], limits) if g == UNPLANNED else between
+        rows.append(SetRow(g, tuple(m), _is_control(test.entries, m, options), curve=summary(m, over)))
 
     def made(blocks: Sequence[Sequence[int]]) -> tuple[list[Block], bool]:
         sets = [(b, summary(b)) for b in blocks]
