@@ -12,9 +12,9 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 96_790
+MOST_LINES = 97_480
 MOST_FILES = 518
-MOST_TEST_LINES = 70_590
+MOST_TEST_LINES = 71_140
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100

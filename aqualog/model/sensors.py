@@ -214,7 +214,7 @@ def _rolling(truth: Truth, sensors: Sensors, name: str, seed: int) -> FloatArray
 
 
 def of_place(name: str, yaw_rate: FloatArray, dt: float) -> FloatArray:
-    """What an accelerometer (`a_x` or `a_y`) one metre ahead of the centre of gravity has besides. (n,) [m/s^2]"""
+    """What an accelerometer (`a_x` or `a_y`) one metre ahead of the centre of gravity has besides. (n,) [m/s²]"""
     return np.gradient(yaw_rate, dt) if name == "a_y" else -(yaw_rate**2)
 
 
