@@ -16,10 +16,11 @@ from aqualog.core.notation import AXLES
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import KEYS, Vehicle
 
-__all__ = ["drive_doubts"]
+__all__ = ["IMPOSSIBLE", "drive_doubts"]
 
 LEAST_SAMPLES = 50  # of the measure
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
+IMPOSSIBLE = 2.5  # [m/s^2] median over a drive: 7 mm of water under all wheels at 100 km/h cost 1.5 (D)
 GAIN_OFF = 0.10  # of the torque gain, or of the mass: more than fuel, load and a driveline's losses
 MOVING = 5.0  # [m/s]
 BRAKED = 3e5  # [Pa] from which the detectors take a wheel for braked

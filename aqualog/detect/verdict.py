@@ -15,11 +15,12 @@ from aqualog.detect.episodes import Stretch, episodes_of
 from aqualog.detect.margin.watch import MARGIN
 from aqualog.detect.registry import all_of
 
-__all__ = ["JOINT", "NEVER_TOGETHER", "Unjudged", "judge"]
+__all__ = ["JOINT", "NEVER_TOGETHER", "UNFIT", "Unjudged", "judge"]
 
 JOINT = tuple(d.name for d in all_of("joint"))
 SHORTEST_S = 1.0  # [s] of dry road are no verdict: at 80 km/h a car is not across a lane then
 NEVER_TOGETHER = f"{SHORTEST_S:g} s in which all signals of the joint detectors have a value"
+UNFIT = "wheel torque that fits mass and acceleration"
 
 _INPUTS = ("omega_", "torque_", "a_x")  # of the joint detectors: beginnings of their names
 _SHORTEST_GAP_S = 0.1  # [s], the last digit of the judged time
@@ -79,8 +80,9 @@ class Unjudged:
 
 
 def judge(
-    events: Sequence[Event], unavailable: Sequence[Unavailable], ran: Collection[str], *, judged_s: float, way: Stretch
-) -> Judgement:
+    events: Sequence[Event], unavailable: Sequence[Unavailable], ran: Collection[str], *, judged_s: float, way: Stretch,
+    is_possible: bool = True,
+) -> Judgement:  # fmt: skip
     """Return the verdict and the episodes of one drive.
 
     Parameters
@@ -93,10 +95,14 @@ def judge(
         Time in which the joint detectors had all of their signals. [s]
     way : callable
         As `Way.between`.
+    is_possible : bool
+        Whether the resistance measure is one that water can make.
 
     A single detector never decides: without a joint one the verdict is `cannot_be_judged`, whatever the others found.
     """
     found = episodes_of(events, way, warns=MARGIN.name in ran)
+    if not is_possible:
+        return Judgement("cannot_be_judged", (UNFIT,), tuple(ran), found, judged_s)
     wet = any(e.kind == "aquaplaning" for e in found)
     if wet or (any(d in ran for d in JOINT) and judged_s >= SHORTEST_S):
         return Judgement("aquaplaning" if wet else "none", (), tuple(ran), found, judged_s)

@@ -9,6 +9,7 @@ import pytest
 from aqualog.checks.look import look
 from aqualog.core.records import Origin
 from aqualog.detect.stream import detect_drive
+from aqualog.report.drive.judged import headline
 from tests.checks.made import CAR as MADE
 from tests.checks.made import made, signals
 from tests.drives import CAR, drive
@@ -93,3 +94,16 @@ def test_resistance_that_cannot_be():
 def test_without_an_accelerometer_nothing_is_said():
     found = notes(a_x=lambda f: pl.Series([None] * f.height, dtype=pl.Float64))
     assert not [n for n in found if "a_x" in n]
+
+
+@pytest.mark.parametrize(("force", "verdict"), [(1.5, "none"), (5.0, "cannot_be_judged")])
+def test_a_resistance_that_no_water_makes_is_no_water(force, verdict):
+    """A torque with a part that no road holds back, as an engine's times one gear ratio has it."""
+    signals, _ = drive(CAR, **SPEEDS, **CURVES)
+    more = 0.5 * force * CAR.mass * CAR.r_l_r
+    frame = signals.frame.with_columns(pl.col("torque_rl", "torque_rr") + more)
+    found = detect_drive(type(signals)(frame, signals.dt_ns, None, {}, signals.quality, ()), KNOWN)
+    assert any(n.startswith("the resistance measure lies at +") for n in found.notes)
+    assert found.judgement.verdict == verdict
+    if verdict == "cannot_be_judged":
+        assert headline(found.judgement).endswith("no wheel torque that fits mass and acceleration")
