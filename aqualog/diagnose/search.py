@@ -246,8 +246,10 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     done: dict[Members, Option | None] = dict(zip(chosen, beside(one, chosen), strict=True))
     # an effect that does not show where it acts is out of every set; what remains may stand, if all of it shows
     noises, absent = [w.noise for w in posterior.weighings], set[str]()
-    for m, o in [*done.items()]:
-        if o is not None and o.refit is not None and (names := silent(o.refit, arena, noises)):
+    shown = {m: silent(o.refit, arena, noises) for m, o in done.items() if o is not None and o.refit is not None}
+    for m, own in shown.items():
+        # beside the best set, no further effect has to make visible what does not show in it
+        if names := own | (shown.get(best, frozenset()) if set(best) <= set(m) else frozenset()):
             absent |= names
             done[m] = None
             rest = tuple(b for b in m if arena.name(b) not in names)

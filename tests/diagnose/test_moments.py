@@ -48,6 +48,10 @@ def test_each_drive_has_its_own_moments():
         sizes = [np.abs(s[list(evidence.columns[i])]).max() for s in evidence.signatures]
         assert [x > 0.0 for x in sizes] == [h.drive == "a", h.drive == "b"]
     load = next(h for h in of_both if h.key == "payload_mass")
+    # besides, a torque that differs from drive to drive looks like a load
+    exact = replace(CAR, spread={"torque_gain": 1e-9})
+    both = [replace(d, vehicle=exact) for d in both]
+    evidence = simulated(both, of_both, Model(), lambda _t, _s: None)
     alone = simulated([one], [load], Model(), lambda _t, _s: None).forgiven[0]
     loads = [c for h, (c, *_) in zip(evidence.asked, evidence.columns, strict=True) if h.key == "payload_mass"]
     # what is forgiven of one of them is what is forgiven of a single drive

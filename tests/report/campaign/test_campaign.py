@@ -120,11 +120,11 @@ def test_what_a_panel_leaves_out_is_written_on_it(browser, folder, tmp_path):
 
 def test_wheels_and_pooled_groups_are_told(page):
     before = texts(page, "#runs tbody tr td:nth-child(6)")
-    pick(page, "RL")
+    pick(page, "RR")
     after = texts(page, "#runs tbody tr td:nth-child(6)")
     assert sum(map(int, after)) < sum(map(int, before))
     shown(page, "#slopes")
-    assert texts(page, "#slopes-key")[0].startswith("RL")
+    assert texts(page, "#slopes-key")[0].startswith("RR")
     assert page.execute_script("return document.getElementById('pooled').hidden")
     pick(page, "n0")  # an own column, by which nothing is split
     assert not page.execute_script("return document.getElementById('pooled').hidden")
