@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -13,10 +13,10 @@ from aqualog.checks.slip import AXLE, slip_doubts
 from aqualog.checks.windows import EXTRA, Windows
 from aqualog.core.intervals import half_width
 from aqualog.core.notation import AXLES
-from aqualog.core.records import BoolArray, FloatArray
+from aqualog.core.records import BoolArray, FloatArray, Remark
 from aqualog.core.vehicle import KEYS, Vehicle
 
-__all__ = ["IMPOSSIBLE", "drive_doubts"]
+__all__ = ["drive_doubts", "may_be_water"]
 
 LEAST_SAMPLES = 50  # of the measure
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
@@ -40,6 +40,11 @@ def drive_doubts(windows: Windows) -> Iterator[Doubt]:
     yield from wrong
     driven = [a for a, torque in drives(_torques(windows)).items() if torque > LEAST_DRIVE]
     yield from slip_doubts(windows, driven[0] if len(driven) == 1 else "", is_doubted=bool(wrong))
+
+
+def may_be_water(remarks: Iterable[Remark]) -> bool:
+    """Whether the resistance measure of a drive is one that water can make."""
+    return all(abs(r.value) <= IMPOSSIBLE for r in remarks if r.kind == "resistance")
 
 
 def _brakes(windows: Windows) -> Iterator[Doubt]:

@@ -8,7 +8,7 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from aqualog.checks.drive import IMPOSSIBLE
+from aqualog.checks.drive import may_be_water
 from aqualog.checks.look import Checks
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import DriveResult, Event, FloatArray, Signals, SlopeSummary, Track, Unavailable
@@ -159,7 +159,7 @@ class Through:
         judgement = judge(
             events, stream.unavailable, [d.name for d in stream.watches], judged_s=self._judged * stream.dt,
             way=self._way.between,
-            is_possible=not any(r.kind == "resistance" and abs(r.value) > IMPOSSIBLE for r in checks),
+            is_possible=may_be_water(checks),
         )  # fmt: skip
         return DriveResult(
             signals=signals,
