@@ -62,8 +62,11 @@ def placed(t_ns: TimeArray, grid_ns: TimeArray, dt_ns: int | None = None) -> Pla
     """
     n, m = t_ns.size, grid_ns.size
     if dt_ns is not None and m:
-        step = np.clip((t_ns - grid_ns[0]) // dt_ns + 1, 0, m)
-        right = np.cumsum(np.bincount(step, minlength=m + 1)[:m])
+        step = t_ns - grid_ns[0]  # in place from here: pages of memory that are fresh cost more than the arithmetic
+        step //= dt_ns
+        step += 1
+        right = np.bincount(np.clip(step, 0, m, out=step), minlength=m + 1)[:m]
+        np.cumsum(right, out=right)
     else:
         right = np.searchsorted(t_ns, grid_ns, side="left")
     exact = (right < n) & (t_ns.take(right, mode="clip") == grid_ns)
@@ -73,7 +76,7 @@ def placed(t_ns: TimeArray, grid_ns: TimeArray, dt_ns: int | None = None) -> Pla
     low = t_ns[before]
     span = t_ns[after] - low
     # integers are subtracted before they become floats: epoch nanoseconds do not fit a double
-    share = (grid_ns[between] - low).astype(np.float64) / span.astype(np.float64)
+    share = (grid_ns[between] - low) / span
     return Placed(right, exact, between, before, after, span, share)
 
 
@@ -85,12 +88,12 @@ def _indices(i: TimeArray) -> TimeArray | slice:
 
 def linear(
     t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, period_ns: int | None = None,
-    at: Placed | None = None,
+    at: Placed | None = None, out: FloatArray | None = None,
 ) -> tuple[FloatArray, BoolArray]:  # fmt: skip
     """Interpolate finite samples (n,) at strictly increasing stamps (n,) linearly to points (m,). [ns]
 
     Intervals up to `gap_ns` are bridged. `period_ns`: median sample time, default that of the stamps; `at`: positions
-    of these points among these stamps, if known.
+    of these points among these stamps, if known; `out` (m,): where the result goes, as in NumPy.
 
     Returns
     -------
@@ -100,12 +103,20 @@ def linear(
         Grid points inside an interval of more than 1.5 median sample times: a sample was missing there.
     """
     bridged = np.zeros(grid_ns.size, dtype=bool)
+    y = np.empty(grid_ns.size) if out is None else out
     if t_ns.size == 0:
-        return np.full(grid_ns.size, np.nan), bridged
+        y.fill(np.nan)
+        return y, bridged
     right, exact, between, before, after, span, share = at or placed(t_ns, grid_ns)
     if not span.size and t_ns.size == grid_ns.size and exact.all():  # the stamps are the grid
-        return x.copy(), bridged
-    y = np.where(exact, x.take(right, mode="clip"), np.nan) if exact.any() else np.full(grid_ns.size, np.nan)
+        y[:] = x
+        return y, bridged
+    if isinstance(between, slice) and between.stop - between.start == y.size:
+        pass  # all of it is written below
+    elif exact.any():
+        y[:] = np.where(exact, x.take(right, mode="clip"), np.nan)
+    else:
+        y.fill(np.nan)
     low = x[before]
     values = np.subtract(x[after], low, out=y[between] if isinstance(between, slice) else None)
     values *= share
@@ -120,9 +131,13 @@ def linear(
     return y, bridged
 
 
-def hold(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, at: Placed | None = None) -> FloatArray:
+def hold(
+    t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, at: Placed | None = None,
+    out: FloatArray | None = None,
+) -> FloatArray:  # fmt: skip
     """Hold the last value for at most `gap_ns`, also beyond the last stamp. Shapes as `linear`."""
-    y = np.full(grid_ns.size, np.nan)
+    y = np.empty(grid_ns.size) if out is None else out
+    y.fill(np.nan)
     if t_ns.size == 0:
         return y
     right, exact, *_ = at or placed(t_ns, grid_ns)
@@ -135,14 +150,14 @@ def hold(t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, gap_ns: int, at:
 
 def bin_mean(
     t_ns: TimeArray, x: FloatArray, grid_ns: TimeArray, *, dt_ns: int, gap_ns: int, period_ns: int | None = None,
-    at: Placed | None = None,
+    at: Placed | None = None, out: FloatArray | None = None,
 ) -> tuple[FloatArray, BoolArray]:  # fmt: skip
     """Average the samples within half a grid step on either side, for signals much faster than the grid.
 
     Plain interpolation would alias their noise into the grid. Where a bin is empty, linear interpolation takes over.
     Returns as `linear`.
     """
-    y, bridged = linear(t_ns, x, grid_ns, gap_ns=gap_ns, period_ns=period_ns, at=at)
+    y, bridged = linear(t_ns, x, grid_ns, gap_ns=gap_ns, period_ns=period_ns, at=at, out=out)
     if t_ns.size == 0:
         return y, bridged
     low = np.searchsorted(t_ns, grid_ns - dt_ns // 2, side="left")
@@ -270,23 +285,24 @@ def _grid_step(cleaned: Sequence[Clean], rate_hz: float | None) -> int:
 
 
 def onto_grid(
-    symbol: Symbol, span: Span, t_ns: TimeArray, x: FloatArray, points: TimeArray, dt_ns: int, at: Placed | None
-) -> tuple[FloatArray, bool]:
+    symbol: Symbol, span: Span, t_ns: TimeArray, x: FloatArray, points: TimeArray, dt_ns: int, at: Placed | None,
+    out: FloatArray,
+) -> bool:  # fmt: skip
     """Put samples (n,) of a signal, at least those around the points (m,) [ns], on the grid; whether one is missing.
 
     `span` is that of the whole signal: its sample time decides what is bridged. `at`: where the points lie among these
-    stamps; None without samples.
+    stamps; None without samples. `out` (m,): where the values go.
     """
     is_state = symbol.kind == "state"
     gap_ns = gap_limit_ns(span.period_ns, is_state=is_state)
-    bridged: BoolArray
     if is_state:
-        return hold(t_ns, x, points, gap_ns=gap_ns, at=at), False
+        hold(t_ns, x, points, gap_ns=gap_ns, at=at, out=out)
+        return False
     if 0 < span.period_ns < dt_ns / 2:
-        y, bridged = bin_mean(t_ns, x, points, dt_ns=dt_ns, gap_ns=gap_ns, period_ns=span.period_ns, at=at)
+        _, bridged = bin_mean(t_ns, x, points, dt_ns=dt_ns, gap_ns=gap_ns, period_ns=span.period_ns, at=at, out=out)
     else:
-        y, bridged = linear(t_ns, x, points, gap_ns=gap_ns, period_ns=span.period_ns, at=at)
-    return y, bool(bridged.any())
+        _, bridged = linear(t_ns, x, points, gap_ns=gap_ns, period_ns=span.period_ns, at=at, out=out)
+    return bool(bridged.any())
 
 
 def missing_samples(span: Span, grid: Grid) -> float:

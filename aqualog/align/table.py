@@ -147,11 +147,13 @@ class Plan:
         place = OfLast(lambda t_ns: placed(t_ns, points, self.grid.dt_ns))
         columns: dict[str, pl.Series] = {}
         bridged: dict[str, bool] = {}
-        for clean in self.cleaned:
+        # one room for all, of huge pages: small ones that are fresh cost more than the arithmetic
+        room = np.empty((len(self.cleaned), points.size))
+        for clean, y in zip(self.cleaned, room, strict=True):
             name = clean.origin.symbol
             t, x = samples[name]
             at = place(t) if t.size else None
-            y, bridged[name] = onto_grid(clean.symbol, clean.span, t, x, points, self.grid.dt_ns, at)
+            bridged[name] = onto_grid(clean.symbol, clean.span, t, x, points, self.grid.dt_ns, at, y)
             for column, series in columns_of(clean.symbol, y, self.vehicle):
                 columns.setdefault(column, series)  # a signal under its canonical name wins over a derived one
         time = pl.Series("t", self.grid.seconds(first, last))

@@ -62,7 +62,11 @@ def placed_on_one_clock(found: list[tuple[np.ndarray, np.ndarray]]) -> list[np.n
     first = found[0][0]
     clock, period = first[:-1] + np.diff(first) // 2, median_period_ns(first)
     place = OfLast(lambda t: placed(t, clock, period))  # even points, as those of a grid
-    return [linear(t, x, clock, gap_ns=5 * period, period_ns=period, at=place(t))[0] for t, x in found]
+    room = np.empty((len(found), clock.size))  # one for all, as the package has it
+    return [
+        linear(t, x, clock, gap_ns=5 * period, period_ns=period, at=place(t), out=y)[0]
+        for (t, x), y in zip(found, room, strict=True)
+    ]
 
 
 def on_one_clock(found: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:

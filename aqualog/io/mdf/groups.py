@@ -208,7 +208,8 @@ class GroupReader(OpenFile):
 
     def _nanoseconds(self, t: _Array) -> tuple[TimeArray, BoolArray]:
         """Time stamps in ns, and which of them are times at all."""
-        usable = np.abs(t) < _LATEST_S - self._start_ns * 1e-9
+        latest = _LATEST_S - self._start_ns * 1e-9
+        usable = (t > -latest) & (t < latest)
         exact = (t if usable.all() else t[usable]) * 1e9
         t_ns = np.round(exact, out=exact).astype(np.int64)
         t_ns += self._start_ns
