@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,9 +18,9 @@ __all__ = ["scale_doubts"]
 LEAST_CORRELATION = 0.6
 LEAST_WINDOWS = 40
 LEAST_CHANGE = 1e-9  # [m/s^2] of a standard deviation: nothing moves
-RATIO = (
-    1.8  # of accelerations: between twice the noise of such a ratio and the 2.2 of mph, the 3.6 of km/h, the 9.81 of g
-)
+# of accelerations, by how well they follow each other: pitch and gain of a sensor make 1.25; mph makes 2.2, time 2
+RATIOS = ((0.9, 12, 1.5), (LEAST_CORRELATION, LEAST_WINDOWS, 1.8))  # least correlation and number of windows
+LENGTHS = (1, 2, 4, 8, 16)  # windows over which both are averaged: time that is too slow needs long ones
 OFF = 0.05  # of speeds: no wear and no GNSS is so far off; a tyre of another size is
 MOVING = 3.0  # [m/s] from which a ratio of speeds means something
 STEADY = 0.04  # between the quartiles of such a ratio: the resolution of slow wheels, and a bend
@@ -122,16 +123,28 @@ def _ratio(x: FloatArray, y: FloatArray) -> float:
 def _acceleration(windows: Windows, *, are_speeds_right: bool) -> Iterator[Doubt]:
     if "a_x" not in windows or not windows.wheels or windows["a_x"].size < 3:
         return
-    step = windows.step_s
-    x, y = changes(windows["a_x"], step), changes(np.gradient(windows.speed, step), step)
-    good = np.isfinite(x) & np.isfinite(y)
-    x, y = x[good], y[good]
-    if x.size < LEAST_WINDOWS or min(x.std(), y.std()) < LEAST_CHANGE:
-        return
-    r, ratio = float(np.corrcoef(x, y)[0, 1]), float(y.std() / x.std())
+    r, ratio, number = max((_beside(windows, k) for k in LENGTHS), key=lambda found: found[0])
+    limit = next((most for least, count, most in RATIOS if r > least and number >= count), math.inf)
     # the scale lies between both regressions: noise, or grades in a_x, make one of the signals the larger one
-    if r > LEAST_CORRELATION and (r * ratio > RATIO or ratio / r < 1.0 / RATIO):
-        what = f"wheel speeds change {ratio:.1f} times as fast as a_x says"
+    if r * ratio > limit or ratio / max(r, LEAST_CORRELATION) < 1.0 / limit:
+        what = f"wheel speeds change {ratio:.2g} times as fast as a_x says"
         g = next((x for x in (G, 1.0 / G) if 1.0 / _ROUGH < ratio / x < _ROUGH), None)
         ways = ({"a_x": Change(g, radius=1.0)},) if g and are_speeds_right else ()
-        yield Doubt("scale", ("a_x",), what, "check the units of both (km/h, g)", ways, ratio)
+        advice = "check the units of both (km/h, g), and of the time stamps"
+        yield Doubt("scale", ("a_x",), what, advice, ways, ratio)
+
+
+def _beside(windows: Windows, length: int) -> tuple[float, float, int]:
+    """Correlation of dv/dt and a_x over means of so many windows, the ratio of their sizes, and how many means."""
+    step = length * windows.step_s
+    n = windows["a_x"].size // length * length
+    a, v = (x[:n].reshape(-1, length).mean(axis=1) for x in (windows["a_x"], windows.speed))
+    if a.size < 3:
+        return 0.0, 1.0, 0
+    # whatever the length, changes of as many means: the time itself may be wrong
+    x, y = changes(a, windows.step_s), changes(np.gradient(v, step), windows.step_s)
+    good = np.isfinite(x) & np.isfinite(y)
+    x, y = x[good], y[good]
+    if x.size < RATIOS[0][1] or min(x.std(), y.std()) < LEAST_CHANGE:
+        return 0.0, 1.0, 0
+    return float(np.corrcoef(x, y)[0, 1]), float(y.std() / x.std()), x.size

@@ -111,6 +111,17 @@ def test_the_right_unit_of_the_acceleration_is_proposed(true, taken, size):
     assert lines({"a_x": size}, a_x=taken) == (f'a_x = {{ channel = "A_X", unit = "{true}" }}',)
 
 
+@pytest.mark.parametrize("times", [0.1, 0.5, 2.0, 10.0])
+def test_time_that_runs_at_another_rate(times):
+    rng = np.random.default_rng(2)
+    noisy = {n: x + (0.1 if n == "a_x" else 0.02) * rng.standard_normal(x.size) for n, x in DRIVE.items()}
+    drive = signals(noisy)
+    drive = replace(drive, dt_ns=round(drive.dt_ns * times))
+    (remark,) = (r for r in look(drive, CAR) if r.kind == "scale")
+    assert remark.value == pytest.approx(1.0 / times, rel=0.2)
+    assert remark.advice.endswith("and of the time stamps")
+
+
 def axle(axle, r_e, *, unit="rad/s", mapped=None, without=()):
     """A drive whose wheels of one axle have this radius in the vehicle file, not their own."""
     own = {n: x for n, x in DRIVE.items() if n not in without}
