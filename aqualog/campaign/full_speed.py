@@ -192,6 +192,7 @@ def _from_passes(group: Group, members: Sequence[Pass], way: str, rng: np.random
     hit = np.array([bool(at) for at in begun])
     # a pass without one had none up to its fastest speed
     v = np.array([min(at, default=p.v_held) for at, p in zip(begun, members, strict=True)])
+    swept = np.array([bool(at) and p.went_without(x) for at, p, x in zip(begun, members, v, strict=True)])
     what = "minor or full spin-downs" if early else "full spin-downs"
     on = f"{int(hit.sum())} of {hit.size} passes with {what}, {3.6 * v.min():.0f} to {3.6 * v.max():.0f} km/h"
     if hit.size < LEAST_PASSES:
@@ -206,8 +207,8 @@ def _from_passes(group: Group, members: Sequence[Pass], way: str, rng: np.random
         which = "with" if hit.sum() < hit.size - hit.sum() else "without"
         return FullSpeed(*bare, rests_on=on, reason=f"{fewer} passes {which} {what}, at least {LEAST_EACH} needed")
     times = rng.multinomial(hit.size, np.full(hit.size, 1.0 / hit.size), size=DRAWS).astype(np.float64)
-    best = fit_half(v, hit, np.ones((1, hit.size)))
-    low, high = (float(x) for x in np.nanquantile(fit_half(v, hit, times), (0.025, 0.975)))
+    best = fit_half(v, hit, np.ones((1, hit.size)), swept)
+    low, high = (float(x) for x in np.nanquantile(fit_half(v, hit, times, swept), (0.025, 0.975)))
     if not float(v.min()) - 5.0 * KMH <= float(best[0]) <= float(v.max()) + 5.0 * KMH:
         return FullSpeed(*bare, rests_on=on, reason="half of the passes would have one only outside the driven speeds")
     v_half, more = float(best[0]), MINOR_HALF if early else 0.0
@@ -232,15 +233,19 @@ def _foretold(group: Group, members: Sequence[Pass]) -> FullSpeed:
     return FullSpeed(*bare, math.exp(mean), (math.exp(low), math.exp(high)), rests_on=on)
 
 
-def fit_half(v: FloatArray, hit: BoolArray, times: FloatArray) -> FloatArray:
+def fit_half(v: FloatArray, hit: BoolArray, times: FloatArray, swept: BoolArray | None = None) -> FloatArray:
     """Speed (b,) [m/s] at which half of the passes have an event: logistic curve of greatest likelihood.
 
     Of speeds `v` (m,) [m/s], of its event or else its fastest, whether a pass has one (m,), and how often each counts
-    (b, m), a fit per row. The width of the curve is kept within 1 ... 14 km/h, so that passes which separate cleanly
-    have a speed too: the middle of the gap. NaN where a row has passes of one kind only.
+    (b, m), a fit per row. `swept` (m,): the pass came to its event from slower speeds, so that its own limit is v; else
+    it is v or less. The width of the curve is kept within 1 ... 14 km/h, so that passes which separate cleanly have a
+    speed too: the middle of the gap. NaN where a row has passes of one kind only.
     """
     z = (v[None, None] - _SPEEDS[:, None, None]) / _WIDTHS[None, :, None]
-    log_p = -np.logaddexp(0.0, np.where(hit, -z, z)).reshape(-1, v.size)
+    log_p = -np.logaddexp(0.0, np.where(hit, -z, z))
+    if swept is not None:  # the density of the curve
+        log_p += np.where(swept, -np.logaddexp(0.0, z) - np.log(_WIDTHS / KMH)[None, :, None], 0.0)
+    log_p = log_p.reshape(-1, v.size)
     likelihood = times @ log_p.T
     both = (times @ hit > 0.0) & (times @ ~hit > 0.0)
     # of equal ones the middle: passes that separate cleanly leave a gap
@@ -248,3 +253,4 @@ def fit_half(v: FloatArray, hit: BoolArray, times: FloatArray) -> FloatArray:
     speed = np.repeat(_SPEEDS, _WIDTHS.size)
     middle = (near @ speed) / near.sum(axis=1)
     return np.where(both, middle, np.nan)
+

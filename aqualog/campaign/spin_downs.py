@@ -19,6 +19,7 @@ __all__ = ["Pass", "SpinDownRow", "minor_spin_downs", "passes"]
 LEAST_S = 0.5  # [s] on the lane that count as a pass
 SETTLED_S = 1.0  # [s] on the lane, from which on the margin has seen the water
 Z90 = 1.644854  # 95 % quantile of the normal distribution
+SWEPT = 2.0 * KMH  # [m/s] slower than an event, from which on a pass has shown that a speed does without: one held varies
 FULL_SLIP = -0.5  # [-] a wheel that has lost half of its speed floats; smaller dips recover by themselves
 
 
@@ -48,6 +49,14 @@ class Pass:
     def v_held(self) -> float:
         """Speed that the pass had or exceeded for half a second. [m/s]"""
         return float(np.sort(self.v)[-min(math.ceil(LEAST_S / self.step_s), self.v.size)])
+
+    def went_without(self, v: float) -> bool:
+        """Whether the pass was slower than `v` [m/s] by `SWEPT` for half a second before it first came to v.
+
+        Where an event begins at v, the pass shows that slower speeds do without it.
+        """
+        before = self.v[: int(np.argmax(self.v >= v))] if (self.v >= v).any() else self.v
+        return int((before <= v - SWEPT).sum()) >= math.ceil(LEAST_S / self.step_s)
 
     @property
     def seconds(self) -> float:

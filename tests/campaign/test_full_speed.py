@@ -147,6 +147,20 @@ def test_the_twenty_of_the_thesis_has_a_tolerance():
     assert full.ci[1] - full.ci[0] < 9.0 * KMH
 
 
+def test_passes_that_sweep_the_speed_have_their_limit_at_their_event():
+    """Limits of 100 +- 3 km/h, passes from 60 to 88 ... 125 km/h: the median of 40 campaigns, and what they cover."""
+    rng = np.random.default_rng(5)
+    found = []
+    for _ in range(40):
+        limits, ends = rng.normal(100.0, 3.0, 16), rng.uniform(88.0, 125.0, 16)
+        of = [Pass(None, 0.1, np.linspace(60.0, end, 140) * KMH, {"fl": np.zeros(140)}, {},
+                   {"fl": (limit * KMH,) if limit < end else ()}) for limit, end in zip(limits, ends, strict=True)]  # fmt: skip
+        found.append(_from_passes((), of, "spin_down", rng))
+    v, low, high = np.array([(f.v, *f.ci) for f in found if math.isfinite(f.v)]).T / KMH
+    assert np.median(v) == pytest.approx(100.0, abs=1.0)
+    assert np.mean((low < 100.0) & (high > 100.0)) > 0.8
+
+
 def test_what_passes_that_are_slower_foretell():
     """The fastest passes count most; what passes share of tyre, water and laws, more of them do not lower."""
 
