@@ -23,7 +23,7 @@ from aqualog.align.grid import (
     placed,
 )
 from aqualog.align.mapping import Entry, SignalMap
-from aqualog.align.timebase import ClockRepair, OfLast, without_copies
+from aqualog.align.timebase import ClockRepair, OfLast, with_spread_stamps, without_copies
 from aqualog.core.errors import SignalError, listed
 from aqualog.core.notation import SYMBOLS
 from aqualog.core.records import Channel, ChannelInfo, FileFaults, Origin, Quality, Signals, TimeFaults
@@ -209,6 +209,7 @@ def build_signals(
         If no signal is usable, units do not fit, or the sources' clocks cannot be joined.
     """
     channels, copies = without_copies({name: channel for name, (_, channel) in mapped.items()})
+    channels, spread = with_spread_stamps(channels)
     repairs: dict[str, ClockRepair] = {}
     span = OfLast(span_of)  # channels of one group have the same stamps
     samples: dict[str, Samples] = {}
@@ -231,7 +232,9 @@ def build_signals(
     table, bridged = plan.table(samples)
     missing = {name: table.frame[name].null_count() for name in plan.symbols}
     facts = plan.facts(
-        missing, frozenset(name for name, gaps in bridged.items() if gaps), [*file_faults, FileFaults(notes=copies)]
+        missing,
+        frozenset(name for name, gaps in bridged.items() if gaps),
+        [*file_faults, FileFaults(notes=(*copies, *spread))],
     )
     return replace(facts, frame=table.frame)
 

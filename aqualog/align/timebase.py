@@ -3,6 +3,7 @@
 | fault | how it looks | rule |
 |---|---|---|
 | duplicate | same stamp again | the later sample wins |
+| rounded | the same number of samples on each stamp, with values that differ | spread evenly up to the next stamp |
 | back-step | up to 1 s back | sorted into place |
 | clock set back | up to 1 s back, then through the same times again | the later samples win, as of duplicates |
 | stray | up to 100 samples elsewhere, then on as before; at either end a day or more away | left out |
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 
 from aqualog.core.records import BoolArray, Channel, FloatArray, TimeArray, TimeFaults
 
-__all__ = ["DAY_NS", "MEDIAN_OF", "ClockRepair", "OfLast", "without_copies"]
+__all__ = ["DAY_NS", "MEDIAN_OF", "ClockRepair", "OfLast", "with_spread_stamps", "without_copies"]
 
 MEDIAN_OF = 1 << 18  # steps, the first ones: a log that is read in pieces has the same median
 
@@ -43,6 +44,7 @@ DAY_NS = 24 * 3600 * _SECOND
 _STRAYS = 100  # samples, at most, that have a stamp from elsewhere
 _SET_BACK = 5  # samples, at least, that a clock that was set back goes through once more
 _MOST_AGAIN = 20_000  # samples that are looked at
+_LEAST_ROUNDED, _LEAST_SHARING, _REGULAR = 5, 2.25, 0.95  # stamps; samples on each; share of stamps that are alike
 
 
 class OfLast(Generic[_Value]):
@@ -243,6 +245,56 @@ def without_copies(channels: Mapping[_Key, Channel]) -> tuple[dict[_Key, Channel
         rows = f"{int(is_copy.sum())} rows from {begin:.2f} to {end:.2f} s"
         notes.setdefault(file, f"{file}: {rows} stand twice, with the same stamps and values: counted once")
     return kept, tuple(notes.values())
+
+
+def with_spread_stamps(channels: Mapping[_Key, Channel]) -> tuple[dict[_Key, Channel], tuple[str, ...]]:
+    """Spread samples that share rounded stamps, as of 100 Hz written with one decimal, evenly between the stamps.
+
+    Returns the channels, and a note for each file with such stamps. What repeats its values is no sample of its own.
+    """
+    spread = dict(channels)
+    notes: dict[str, str] = {}
+    of_last = OfLast(_spread)
+    for key, c in channels.items():
+        found = of_last(c.t_ns)
+        same = np.diff(c.t_ns) == 0
+        if found is None or 2 * int((np.diff(c.values)[same] != 0.0).sum()) < int(same.sum()):
+            continue
+        spread[key] = replace(c, t_ns=found[0])
+        step, period = (f"{x * 1e-9:.4g} s" for x in found[1:])
+        what = f"its time stamps are rounded to {step}; samples that share one are spread evenly, {period} apart"
+        notes.setdefault(c.info.file, f"{c.info.file}: {what}")
+    return spread, tuple(notes.values())
+
+
+def _spread(t_ns: TimeArray) -> tuple[TimeArray, float, float] | None:
+    """Stamps (n,) spread evenly, the step they are rounded to and that between samples [ns]; None if not rounded."""
+    starts = np.flatnonzero(np.append(True, np.diff(t_ns) != 0))
+    if not _LEAST_ROUNDED <= starts.size < t_ns.size / _LEAST_SHARING:
+        return None
+    steps, count = np.diff(t_ns[starts]), np.diff(np.append(starts, t_ns.size))
+    step, usual = float(np.median(steps)), float(count[1:-1].mean())
+    is_usual = np.abs(count[1:-1] - usual) <= max(1.25, 0.25 * usual)  # a log begins and ends between two stamps
+    is_even = np.abs(steps - step) <= 0.01 * step
+    if is_usual.mean() < _REGULAR or is_even.mean() < _REGULAR:
+        return None
+    period = step / float(count[1:-1][is_usual].mean())
+    # what is cut off begins in the middle of a step if it is rounded, at its start if it is truncated
+    middle = (step - period) / 2.0 if count[0] > 0.75 * usual else 0.0
+    spread = np.empty_like(t_ns)
+    for runs in np.split(np.arange(starts.size), np.flatnonzero(~is_even) + 1):
+        at, inner = starts[runs], runs[1:-1]
+        k = np.arange(at[0], at[-1] + count[runs[-1]])
+        if inner.size < 2:
+            offset = period * (k - np.repeat(at, count[runs])) - (step / 2.0 if not middle else 0.0)
+            spread[k] = t_ns[k] + np.round(offset).astype(np.int64)
+            continue
+        k_mid, t_mid = starts[inner] + (count[inner] - 1) / 2.0, t_ns[starts[inner]] - t_ns[at[0]] + middle
+        t = np.interp(k, k_mid, t_mid)
+        t = np.where(k < k_mid[0], t_mid[0] + period * (k - k_mid[0]), t)
+        t = np.where(k > k_mid[-1], t_mid[-1] + period * (k - k_mid[-1]), t)
+        spread[k] = t_ns[at[0]] + np.round(t).astype(np.int64)
+    return spread, step, period
 
 
 def _written_twice(t_ns: TimeArray, columns: Sequence[FloatArray]) -> BoolArray:

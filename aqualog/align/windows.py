@@ -4,7 +4,7 @@ The files are read twice. The first pass finds what depends on the whole of a si
 times, counts. (A frozen or joined one needs one pass more.) The second pass reads the samples. A window's values
 equal those of `build_signals` bit for bit: both use the same cleaner, and every point of the grid has the same samples
 around it.
-Stamps out of order, resets and wraps need the whole channel: such a log raises `NotInPiecesError` before the first
+Stamps out of order or rounded, resets and wraps need the whole channel: such a log raises `NotInPiecesError` before the first
 window.
 """
 
@@ -26,6 +26,7 @@ from aqualog.io.reader import Part
 __all__ = ["LongDrive", "NotInPiecesError", "Parts", "long_drive"]
 
 _MAX_ROWS = 4_000_000_000
+_MANY = 100  # steps, of which half are no doubled samples: rounded stamps are spread in a whole channel
 _SECOND = 1_000_000_000
 
 Parts = Callable[[], Sequence[Part]]  # every call goes through the files anew
@@ -150,6 +151,8 @@ class _InOrder:
         if shortest > 0:
             return self._clean(t[:-1], raw[:-1])
         same = steps == 0
+        if 2 * int(same.sum()) > steps.size > _MANY:
+            raise NotInPiecesError(f"{self._cleaner.where}: time stamps that many samples share")
         self._duplicates += int(same.sum())
         if self._first_duplicate_ns is None:
             self._first_duplicate_ns = int(t[np.argmax(same)])

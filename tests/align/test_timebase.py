@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aqualog.align.timebase import ClockRepair, without_copies
+from aqualog.align.timebase import ClockRepair, with_spread_stamps, without_copies
 from aqualog.core.records import Channel, ChannelInfo, TimeFaults
 
 MS = 1_000_000
@@ -159,6 +159,21 @@ def test_rows_written_twice_count_once(begin):
     assert without_copies({0: written["constant"]})[1] == ()
     written["noise"].values[1600] += 1e-6  # another drive on the same clock, or another pass
     assert without_copies(written)[1] == ()
+
+
+@pytest.mark.parametrize("rounding", [np.floor, np.round])
+@pytest.mark.parametrize("step", [50 * MS, 100 * MS, S])
+def test_rounded_stamps_are_spread_evenly(rounding, step):
+    """A log with a pause: the first stamp shows whether its stamps were rounded or cut off."""
+    t = steady(6000) + np.where(np.arange(6000) > 3003, 5_330 * MS, 0)
+    x = np.random.default_rng(1).normal(size=6000)
+    info = ChannelInfo("x", "x", "", 6000, "a.csv")
+    spread, notes = with_spread_stamps({"x": Channel(info, (rounding(t / step) * step).astype(np.int64), x, False)})
+    assert np.abs(spread["x"].t_ns - t).max() < 0.5 * MS
+    assert f"rounded to {step / S:g} s" in notes[0]
+    held = np.repeat(x[::100], 100)  # what repeats its values is no sample of its own
+    assert with_spread_stamps({"x": Channel(info, t // step * step, held, False)})[1] == ()
+    assert with_spread_stamps({"x": Channel(info, t, x, False)})[1] == ()
 
 
 def test_channels_of_one_file_shift_together_and_share_a_repair():
