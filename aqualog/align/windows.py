@@ -4,8 +4,8 @@ The files are read twice. The first pass finds what depends on the whole of a si
 times, counts. (A frozen or joined one needs one pass more.) The second pass reads the samples. A window's values
 equal those of `build_signals` bit for bit: both use the same cleaner, and every point of the grid has the same samples
 around it.
-Stamps out of order or rounded, resets and wraps need the whole channel: such a log raises `NotInPiecesError` before the first
-window.
+Stamps out of order or rounded, resets and wraps need the whole channel: such a log raises `NotInPiecesError` before
+the first window.
 """
 
 from __future__ import annotations

@@ -253,4 +253,3 @@ def fit_half(v: FloatArray, hit: BoolArray, times: FloatArray, swept: BoolArray 
     speed = np.repeat(_SPEEDS, _WIDTHS.size)
     middle = (near @ speed) / near.sum(axis=1)
     return np.where(both, middle, np.nan)
-

@@ -19,7 +19,7 @@ __all__ = ["Pass", "SpinDownRow", "minor_spin_downs", "passes"]
 LEAST_S = 0.5  # [s] on the lane that count as a pass
 SETTLED_S = 1.0  # [s] on the lane, from which on the margin has seen the water
 Z90 = 1.644854  # 95 % quantile of the normal distribution
-SWEPT = 2.0 * KMH  # [m/s] slower than an event, from which on a pass has shown that a speed does without: one held varies
+SWEPT = 2.0 * KMH  # [m/s] slower than an event, as far as a speed that is held varies
 FULL_SLIP = -0.5  # [-] a wheel that has lost half of its speed floats; smaller dips recover by themselves
 
 
