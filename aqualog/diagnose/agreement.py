@@ -20,11 +20,8 @@ __all__ = ["agreements", "contradicted", "widened"]
 
 
 def agreements(found: Found, r: Refit) -> tuple[Agreement, ...]:
-    """One agreement for each value of the refitted set; empty for a single drive.
-
-    `r`: its signatures at its values apply to every drive. Uses the linear model at the set's values: no drive is
-    simulated again. Tolerances count for each drive separately, as if the file had a different error in each.
-    """
+    """One agreement for each value of the refitted set, by the linear model there; empty for a single drive. Tolerances
+    count for each drive, as if the file had a different error in each."""
     evidence = found.arena.evidence
     drives = [evidence.drives[p.drive] for p in found.arena.parts]
     if len(drives) < 2:
@@ -42,10 +39,8 @@ def agreements(found: Found, r: Refit) -> tuple[Agreement, ...]:
     for k, (h, name) in enumerate(r.names):
         if h.drive:
             continue  # nothing to agree on
-        unit = h.parameter(name).unit
-        values = r.values[k] + alone[:, k]
-        half = Z95 * sd[:, k]
-        each = [Estimate(float(v), float(v - x), float(v + x), unit) for v, x in zip(values, half, strict=True)]
+        around = zip((r.values[k] + alone[:, k]).tolist(), (Z95 * sd[:, k]).tolist(), strict=True)
+        each = [Estimate(v, v - half, v + half, h.parameter(name).unit) for v, half in around]
         p = 10.0 ** -chi2_log_p(_heterogeneity(each), len(drives) - 1)
         of_drives = tuple(
             ByDrive(d.name, e, float(r.values[k] + o), float(gain))
@@ -95,15 +90,13 @@ def _heterogeneity(each: Sequence[Estimate]) -> float:
 def _normal(found: Found, r: Refit, columns: Sequence[int]) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Normal equations of each drive around the set's values (D, k, k), (D, k), and the spread between drives (k,)."""
     G, b = [], []
-    apart: FloatArray = np.zeros(len(columns))
     for i, (p, w) in enumerate(zip(found.arena.parts, found.posterior.weighings, strict=True)):
         own = replace(found.arena, parts=(p,), rows=found.arena.rows[i : i + 1])
         measure = metric(own, [w], share=KNOWN, beside=columns)
         J, y = measure.rows(r.signatures), measure.rows([x[None] for x in r.residuals])
         G.append(measure.inner(J, J))
         b.append(measure.inner(J, y)[:, 0])
-        apart = measure.apart[list(columns)]
-    return np.array(G), np.array(b), apart
+    return np.array(G), np.array(b), measure.apart[list(columns)]
 
 
 def _loss(G: FloatArray, b: FloatArray, delta: FloatArray) -> float:

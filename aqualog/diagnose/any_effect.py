@@ -14,7 +14,7 @@ from aqualog.diagnose.evidence import Evidence, tolerant
 from aqualog.diagnose.records import Significance
 
 __all__ = [
-    "ALIKE", "SURROGATES", "Calibration", "calibrate", "chance", "gains_of", "gumbel_p", "significance",
+    "ALIKE", "SURROGATES", "Calibration", "calibrate", "gains_of", "gumbel_p", "significance",
 ]  # fmt: skip
 
 # draws of noise: on 200 made drives without effect of 40 s, the level 0.05 was passed by 0.115 with 19, 0.080 with 49
@@ -49,15 +49,10 @@ def gains_of(evidence: Evidence, gram: FloatArray) -> FloatArray:
 
 def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: float, seed: int) -> Calibration:
     """Null distribution of the largest gain, from `surrogates` draws; of none Bonferroni's bound [bonferroni1936].
-
-    The residuals are whitened, so noise alone makes the columns' inner products with them normal, with the columns' own
-    inner products as covariance. A surrogate [theiler1992] is one draw of normal numbers, as many as there are columns.
-    `plain` (K + 1, K + 1): inner products without tolerances, which also show what hypotheses are alike, so that one
-    test covers them. `level`: share of logs without effect that may be reported as having one.
-    """
-    sizes = _sizes(evidence)
-    groups = _groups(evidence, plain)
-    leaders = sorted({g for g in groups.tolist() if not evidence.asked[g].allowed})
+    Noise alone makes the columns' inner products with whitened residuals normal, with their own as covariance: a
+    surrogate [theiler1992] is one draw. `plain` (K + 1, K + 1): inner products without tolerances; `level`: share of
+    logs without effect that may be reported as having one."""
+    sizes, leaders = _sizes(evidence), _leaders(evidence, plain)
     # of the largest of as many gains, each of one degree of freedom, whatever their dependence
     bound = NormalDist().inv_cdf(1.0 - 0.5 * level / max(len(leaders), 1)) ** 2
     if surrogates == 0:
@@ -70,8 +65,7 @@ def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: 
     rng = np.random.default_rng(seed)
     b = root @ rng.standard_normal((surrogates, len(root))).T
     drawn = gains_of(evidence, tolerant(evidence, np.concatenate([inner, b], axis=1)))
-    drawn = drawn.reshape(len(sizes), surrogates).T
-    maxima = (drawn / sizes)[:, leaders].max(axis=1)
+    maxima = (drawn.reshape(len(sizes), surrogates).T / sizes)[:, leaders].max(axis=1)
     # where tolerances are larger than the noise, noise alone gives almost no gain; the car's own deviations do
     mu, beta = _gumbel(maxima)
     threshold = max(mu - beta * math.log(-math.log1p(-level)), bound)
@@ -81,15 +75,11 @@ def calibrate(evidence: Evidence, plain: FloatArray, *, surrogates: int, level: 
 def significance(evidence: Evidence, gram: FloatArray, c: Calibration, level: float) -> Significance:
     """The test on inner products (K + 1, K + 1) that forgive the tolerances."""
     statistic = float((gains_of(evidence, gram) / _sizes(evidence)).max())
-    bound = max(chance(statistic, c.tested), 1e-12)
+    # of the share of nulls whose largest of as many gains, each of one degree of freedom, is beyond this one
+    bound = max(min(1.0, c.tested * math.erfc(math.sqrt(0.5 * max(statistic, 0.0)))), 1e-12)
     p = max(gumbel_p(c.maxima, statistic), bound) if c.maxima.size else bound
     achieved = float((c.maxima > c.threshold).mean()) if c.maxima.size else math.nan
     return Significance(statistic, c.threshold, p, level, achieved, c.maxima.size)
-
-
-def chance(x: float, count: int) -> float:
-    """Bound of the share of nulls whose largest of `count` gains, each of one degree of freedom, is beyond x."""
-    return min(1.0, count * math.erfc(math.sqrt(0.5 * max(x, 0.0))))
 
 
 def _sizes(evidence: Evidence) -> FloatArray:
@@ -108,22 +98,13 @@ def _gumbel(maxima: FloatArray) -> tuple[float, float]:
     return float(maxima.mean()) - EULER * beta, beta
 
 
-def _groups(evidence: Evidence, gram: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Leader of each hypothesis: the first one with nearly the same whitened signature."""
-    energy = np.diag(gram)
-    out = np.arange(len(evidence.asked))
-    leaders: list[int] = []
-    for i, columns in enumerate(evidence.columns):
-        if len(columns) > 1 or energy[columns[0]] <= 1e-12:
-            leaders.append(i)
-            continue
-        for j in leaders:
-            other = evidence.columns[j]
-            if len(other) == 1 and energy[other[0]] > 1e-12:
-                cosine = gram[columns[0], other[0]] / math.sqrt(energy[columns[0]] * energy[other[0]])
-                if abs(cosine) > ALIKE:
-                    out[i] = j
-                    break
-        else:
-            leaders.append(i)
-    return out
+def _leaders(evidence: Evidence, gram: FloatArray) -> list[int]:
+    """Hypotheses without tolerances, of those with nearly the same whitened signature the first one."""
+    energy, seen, out = np.diag(gram), list[int](), []
+    for i, (c, *more) in enumerate(evidence.columns):
+        if not more and energy[c] > 1e-12:
+            if any(abs(gram[c, o] / math.sqrt(energy[c] * energy[o])) > ALIKE for o in seen):
+                continue
+            seen.append(c)
+        out.append(i)
+    return [i for i in out if not evidence.asked[i].allowed]

@@ -167,10 +167,8 @@ def unit_force(drive: Drive, model: Model, base: FloatArray) -> FloatArray:
 
 
 def make_arena(evidence: Evidence, model: Model) -> Arena:
-    """All effects of the evidence that are not tolerances, and all shapes that the drives can show.
-
-    Shapes of time and place take part on a single drive only: another drive has other ones.
-    """
+    """All effects of the evidence that are not tolerances, and all shapes that the drives can show; those of time and
+    place on a single drive only."""
     try:
         forces = [unit_force(d, model, r) for d, r in zip(evidence.drives, evidence.residuals, strict=True)]
     except ConfigError:
@@ -208,11 +206,8 @@ def arena_of(evidence: Evidence, forces: Sequence[FloatArray]) -> Arena:
 
 
 def known_only(arena: Arena) -> Arena:
-    """The arena without unknown shapes and without the tolerances along coordinates.
-
-    Those tolerances forgive a drag or a slip slope that is off by several of its own. Whether a form is unknown must
-    not depend on them; which known effect it is may be judged more sharply.
-    """
+    """The arena without unknown shapes and without the tolerances along coordinates, which forgive a drag or a slip
+    slope that is off by several of its own: known effects may be judged more sharply."""
     k = arena.evidence.count
     blocks = tuple(b for b in arena.blocks if b.kind == "effect")
     return replace(arena, blocks=blocks, sd=arena.sd[:k], tolerance=arena.tolerance[:k, :k])

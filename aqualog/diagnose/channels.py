@@ -1,7 +1,4 @@
-"""Residual channels by physics: the same function of signals, measured or simulated.
-
-The residual of a channel is its value from the measured signals minus its value from the simulated ones.
-"""
+"""Residual channels by physics: the value of a function of the measured signals minus that of the simulated ones."""
 
 from __future__ import annotations
 
@@ -24,7 +21,7 @@ BLOCK_S = 0.1  # [s] keeps what is slower than 5 Hz; faster motion comes from sp
 
 
 class Kind(NamedTuple):
-    """Title and unit of a channel for the page."""
+    """A channel for the page."""
 
     title: str
     unit: str
@@ -65,11 +62,8 @@ def channels_of(present: frozenset[str], vehicle: Vehicle) -> tuple[str, ...]:
 
 
 def contrasts(channels: tuple[str, ...]) -> FloatArray:
-    """Combinations of channels (C, C), as rows, that share as little noise as possible.
-
-    The accelerometer is in the force balance and in the kinematic channel; their difference compares wheels with torque
-    and is free of its noise. A reference velocity is in the slip of all four wheels; only their mean keeps it.
-    """
+    """Combinations of channels (C, C), as rows, that share as little noise as possible: the accelerometer's is in the
+    force balance and in the kinematic channel, a reference velocity's in the slip of all four wheels."""
     out = np.eye(len(channels))
     at = {c: i for i, c in enumerate(channels)}
     if {"force_balance", "kinematic"} <= set(at):
@@ -87,54 +81,40 @@ def contrasts(channels: tuple[str, ...]) -> FloatArray:
 def channel_values(
     columns: Mapping[str, FloatArray], channels: tuple[str, ...], vehicle: Vehicle, *, dt: float
 ) -> FloatArray:
-    """Channels of signals as means over blocks of 0.1 s. (C, m), NaN where a signal is missing
+    """Channels of signals as means over blocks of 0.1 s, NaN where a signal is missing. (C, m)
 
     `columns` (n,) at the step `dt` [s]: canonical signals; of a simulation also `nudge_seen`, the acceleration that
-    drew its speed to the measured one. `vehicle`: radii and distances by which wheels are compared, the file's for both
-    sides. `force_balance` is the accelerometer itself, or else the change of the speed: what the torque explains is on
-    the simulated side. ISO 8855 signs [iso8855_2011].
+    drew its speed to the measured one. `vehicle`: the file's for both sides. `force_balance` is the accelerometer
+    itself, or else the change of the speed: what the torque explains is on the simulated side. ISO 8855 signs
+    [iso8855_2011].
     """
     mean = {n: block_means(x, dt) for n, x in columns.items()}
     step = block_step(dt)
     # as a speed, so that it passes the same differences as the wheels'
     drawn = block_means(np.cumsum(columns["nudge_seen"]) * dt, dt) if "nudge_seen" in columns else 0.0
-    wheels = centre_line_speeds(mean, vehicle) if all(f"omega_{w}" in mean for w in WHEELS) else None
-    v_x = mean.get("v_x")
+    has_wheels = all(f"omega_{w}" in mean for w in WHEELS)
+    wheels = centre_line_speeds(mean, vehicle) if has_wheels else np.empty((4, 0))
+    speed = wheels.mean(axis=0) if has_wheels else mean.get("v_x", np.empty(0))
     out = []
     for name in channels:
         if name == "force_balance":
-            x = mean["a_x"] if "a_x" in mean else np.gradient(_speed(wheels, v_x) - drawn, step)
+            x = mean["a_x"] if "a_x" in mean else np.gradient(speed - drawn, step)
         elif name == "kinematic":
-            x = mean["a_x"] - np.gradient(_speed(wheels, v_x) - drawn, step)
+            x = mean["a_x"] - np.gradient(speed - drawn, step)
         elif name == "lateral":
-            x = mean["a_y"] - _speed(None if v_x is not None else wheels, v_x) * mean["yaw_rate"]
+            x = mean["a_y"] - mean.get("v_x", speed) * mean["yaw_rate"]
         elif name.startswith("tie_rod"):
             x = mean[name]
+        elif name == "axle_slip":
+            front, rear = 0.5 * (wheels[0] + wheels[1]), 0.5 * (wheels[2] + wheels[3])
+            x = front - rear if vehicle.drivetrain == "fwd" else rear - front
+        elif name.startswith("side_slip"):
+            left, right = wheels[:2] if name == "side_slip_f" else wheels[2:]
+            x = left - right
         else:
-            assert wheels is not None
-            x = _slip_channel(name, wheels, v_x, vehicle)
+            x = wheels[WHEELS.index(name[-2:])] - mean["v_x"]
         out.append(x)
     return np.array(out)
-
-
-def _speed(wheels: FloatArray | None, v_x: FloatArray | None) -> FloatArray:
-    """Mean of the wheels, or else the reference velocity. [m/s]"""
-    if wheels is not None:
-        return np.asarray(wheels.mean(axis=0))
-    assert v_x is not None
-    return v_x
-
-
-def _slip_channel(name: str, wheels: FloatArray, v_x: FloatArray | None, vehicle: Vehicle) -> FloatArray:
-    front: FloatArray = 0.5 * (wheels[0] + wheels[1])
-    rear: FloatArray = 0.5 * (wheels[2] + wheels[3])
-    left, right = (wheels[0], wheels[1]) if name == "side_slip_f" else (wheels[2], wheels[3])
-    if name == "axle_slip":
-        return np.asarray(front - rear if vehicle.drivetrain == "fwd" else rear - front)
-    if name.startswith("side_slip"):
-        return np.asarray(left - right)
-    assert v_x is not None
-    return np.asarray(wheels[WHEELS.index(name[-2:])] - v_x)
 
 
 def centre_line_speeds(columns: Mapping[str, FloatArray], vehicle: Vehicle) -> FloatArray:

@@ -31,12 +31,9 @@ NEGLIGIBLE = 1.0  # variance, in units of white noise's, of a direction of the t
 
 @dataclass(frozen=True, slots=True)
 class Posterior(Sets):
-    """The posterior over sets with its inner products, `gram` plain and `tolerant`.
-
-    `most`: by which any set may be likelier than none [nats (natural logarithm)]. What is slow may as well be noise,
-    and beside the best set the noise has no part of it: none at all is less likely there than beside a noise of its
-    own.
-    """
+    """The posterior over sets with its inner products, `gram` plain and `tolerant`. `most`: by which any set may be
+    likelier than none, since what is slow may as well be noise, of which the noise beside the best set has no part.
+    [nats (natural logarithm)]"""
 
     gram: FloatArray
     tolerant: FloatArray
@@ -46,11 +43,8 @@ class Posterior(Sets):
 
 @dataclass(frozen=True, slots=True)
 class _Noise:
-    """A noise beside a set, with the set's values there.
-
-    `likely`: log of the measurement's marginal likelihood under noise, tolerances and the set, with the set's prior;
-    `bare` under noise and tolerances alone.
-    """
+    """A noise beside a set, with the set's values there. `likely`: log of the measurement's marginal likelihood under
+    noise, tolerances and the set, with the set's prior; `bare` under noise and tolerances alone."""
 
     members: Members
     weighings: tuple[Weighing, ...]
@@ -86,13 +80,10 @@ class Begun:
 
 
 def compete(arena: Arena, *, rounds: int = ROUNDS, begun: Begun | None = None) -> Posterior:
-    """The posterior over the sets that a search with swaps visits.
-
-    The noise is that beside which the measurement is most likely, after one of the first candidates in the metrics of
-    coloured noise and of both white ones, or after the best set so far. Else a slow effect would count as noise and
-    could not be found. The noise is sought with the whole likelihood, in at most so many rounds; the posterior has a
-    share of it. `begun`: of the same arena, where fewer rounds of it are known already.
-    """
+    """The posterior over the sets that a search with swaps visits. The noise is that beside which the measurement is
+    most likely, after one of the first candidates in the metrics of coloured noise and of both white ones, or after the
+    best set so far: else a slow effect would count as noise. It is sought with the whole likelihood, in at most so many
+    rounds; the posterior has a share of it. `begun`: of the same arena, where fewer rounds of it are known already."""
     only = begun is None
     begun = begun or begin(arena)
     noise = begun.after((), None)
@@ -161,11 +152,9 @@ def begin(arena: Arena) -> Begun:
 
 
 def _beside(begun: Begun, members: Members, fit: Fitted | None) -> _Noise:
-    """The noise that a set of these values leaves: a step of expectation and maximisation [dempster1977].
-
-    The set's values are not exactly known: draws of what is left keep the noise from being too small. What the car
-    differs by anyway stays in the noise: it is of the size of the simulator's own errors, for which no noise stands.
-    """
+    """The noise that a set of these values leaves: a step of expectation and maximisation [dempster1977]. Draws of the
+    values keep it from being too small. What the car differs by anyway stays in it: it is of the size of the
+    simulator's own errors, for which no noise stands."""
     arena = begun.arena
     if fit is None or not members:
         left = [p.residual[None] for p in arena.parts]

@@ -1,14 +1,9 @@
 """One competition of known effects, unknown shapes and roads, in one evidence.
 
 Everything that may be in a residual is a block of columns with a Gaussian prior of physical size. Beside a set of
-blocks the log of the marginal likelihood that one more block gains is
-
-    -1/2 log |I + P A| + 1/2 b' (P^-1 + A)^-1 b,    A = X'X, b = X'y, both beside the set
-
-so that a shape of twelve columns pays for its freedom and a known effect wins where it says the same with one.
-
-No simulator is the car. Its errors are no noise, so with enough samples a likelihood is sure of anything. A share of
-its logarithm counts instead: a coarsened posterior [miller2018].
+blocks one more block gains -1/2 log |I + P A| + 1/2 b' (P^-1 + A)^-1 b of the log of the marginal likelihood, with A =
+X'X and b = X'y, both beside the set. So a shape of twelve columns pays for its freedom. A simulator's errors are no
+noise: a share of the likelihood's logarithm counts, a coarsened posterior [miller2018].
 """
 
 from __future__ import annotations
@@ -36,10 +31,8 @@ SCALES = (1.0, 3.0)  # of the usual size: half of all deviations are three times
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """What may be in a residual: `columns` of the Gram matrix, their `prior` covariance, log of how usual it is.
-
-    `tag`: what it stands for, a hypothesis or a shape; `low` and `high` bounds of the columns' values.
-    """
+    """What may be in a residual: `columns` of the Gram matrix, their `prior` covariance, log of how usual it is; `tag`:
+    hypothesis or shape that it stands for; `low` and `high` bounds of the columns' values."""
 
     key: str
     kind: Literal["effect", "shape", "road"]
@@ -63,11 +56,8 @@ class State:
 
 
 class Packed(NamedTuple):
-    """Blocks of the same number of columns k together, to be scored at once.
-
-    `at` (B,) numbers of the blocks, `columns` (B, k), `root` (B, k, k) of the prior covariance, `low` and `high` (B, k)
-    bounds of values, infinite without any.
-    """
+    """Blocks of the same number of columns k, to be scored at once: `at` (B,) their numbers, `columns` (B, k), `root`
+    (B, k, k) of the prior covariance, `low` and `high` (B, k) bounds of values, infinite without any."""
 
     at: NDArray[np.intp]
     columns: NDArray[np.intp]

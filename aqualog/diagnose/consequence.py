@@ -45,15 +45,10 @@ def consequences(vehicle: Vehicle, model: Model, *, seed: int = 1) -> tuple[Cons
     """Detectors on simulated drives of a model, without and with it: one for each of `DETECTORS` that could run.
 
     The car of the model makes the drives of `DRY` and passes the water of `PASSES`: 1.3 mm under worn tyres, after 15 s
-    of dry road. Each drive is judged with the vehicle file alone and with the model in it. A pass counts if a wheel
-    floats, and as found if an event begins on its water no later than 2 s after that. The latencies are means over the
-    passes found both times, None without any. An event outside of water and of the second after it is a false alarm;
-    `distance_km` is the distance driven outside of them. `seed` >= 0 of roads, weather, drivers and sensors.
-
-    Raises
-    ------
-    ConfigError
-        If the car cannot drive with the terms of the model.
+    of dry road. A pass counts if a wheel floats, and as found if an event begins on its water no later than 2 s after
+    that. The latencies are means over the passes found both times, None without any. An event outside of water and of
+    the second after it is a false alarm; `distance_km` is the distance driven outside of them. `seed` >= 0. ConfigError
+    if the car cannot drive with the terms of the model.
     """
 
     def one(scenario: Scenario) -> tuple[RunRecord, RunRecord]:

@@ -55,12 +55,10 @@ SPINS = 0.15  # slip of a wheel on dry road that its tyre no longer holds
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """One drive: `course` for the simulation, `columns` measured (n,), `mask` (m,) of usable blocks of 0.1 s.
-
-    `speed` (n,) is the measured speed without noise [m/s]; the speed of the course leads it by the lag of the
-    simulation. `coordinates` (m,): quantities that a remaining error may depend on. `untorqued`: the log has no torque.
-    The torque that the base model needs for the measured speed replaces it, and the force balance is not judged.
-    """
+    """One drive: `course` for the simulation, `columns` measured (n,), `mask` (m,) of usable blocks of 0.1 s. `speed`
+    (n,) is the measured speed without noise [m/s]; that of the course leads it by the lag of the simulation.
+    `coordinates` (m,): quantities that a remaining error may depend on. `untorqued`: the log has no torque, the one
+    that the base model needs for the measured speed replaces it, and the force balance is not judged."""
 
     name: str
     dt: float
@@ -194,11 +192,8 @@ def _judged_on_water(mask: BoolArray, course: Course, dt: float) -> list[str]:
 
 
 def led_by(drive: Drive, model: Model) -> Drive:
-    """The drive with a target speed with which the simulation of a model meets the measured speed.
-
-    `prepare` computes the target for the vehicle file's car. An effect that changes the acceleration by a makes that
-    target wrong by a / FOLLOW_RATE: 0.2 m/s² of drag give 0.7 m/s, and the drag at that speed is 5 % off.
-    """
+    """The drive with a target speed with which the simulation of a model, not the file's car, meets the measured speed:
+    0.2 m/s² of drag shift it by 0.7 m/s, at which the drag is 5 % off."""
     measured = replace(drive.course, v_x=drive.speed)
     return replace(drive, course=_without_lag(measured, follow(drive.vehicle, measured, model.of(drive.name))))
 
@@ -218,11 +213,8 @@ def _slides(led: Mapping[str, FloatArray], vehicle: Vehicle) -> BoolArray:
 
 
 def _without_lag(course: Course, led: Mapping[str, FloatArray]) -> Course:
-    """The course with a target speed that makes the simulated speed, `led` along it, meet the measured one.
-
-    The simulation follows its target with a lag. A lagging copy of the measured speed's noise would look like a delayed
-    signal.
-    """
+    """The course with a target speed that makes the simulated speed, `led` along it with a lag, meet the measured one:
+    a lagging copy of its noise would look like a delayed signal."""
     return replace(course, v_x=course.v_x + led["nudge"] / FOLLOW_RATE)
 
 
@@ -242,11 +234,8 @@ def _silent(signals: Signals, present: frozenset[str]) -> list[str]:
 
 
 def _as_known(vehicle: Vehicle, signals: Signals) -> Vehicle:
-    """The vehicle without radii where the log gives wheel speeds in km/h.
-
-    The control unit converted with its own radii. The vehicle file's radii convert back to wheel speeds, whatever their
-    values.
-    """
+    """The vehicle without radii where the log gives wheel speeds in km/h: the file's radii convert them back, whatever
+    their values."""
     wheels = [o for n, o in signals.origins.items() if n.startswith("omega_")]
     if not any(is_unit(o.unit) and parse_unit(o.unit).dimension == "speed" for o in wheels):
         return vehicle
@@ -273,9 +262,8 @@ def _bridged(x: FloatArray, dt: float, gaps: BoolArray) -> FloatArray:
         gaps[:] = True
         return np.zeros_like(x)
     where = np.flatnonzero(good)
-    before = np.maximum.accumulate(np.where(good, np.arange(x.size), -1))
-    after = np.minimum.accumulate(np.where(good, np.arange(x.size), 2 * x.size)[::-1])[::-1]
-    gaps |= ~good & ((after - before) * dt > GAP_S)
+    is_long = np.diff(where, prepend=-1, append=2 * x.size) * dt > GAP_S  # of the gap before each, and of the last one
+    gaps |= ~good & is_long[np.cumsum(good)]
     return np.interp(np.arange(x.size), where, x[where])
 
 
@@ -288,25 +276,17 @@ def _lanes(columns: Mapping[str, FloatArray], dt: float) -> tuple[Lane, ...]:
     left, right = told[0], told[-1]
     wet: BoolArray = np.maximum(left, right) > 1e-5
     # each step of a depth that is logged in steps makes a stretch
-    change = np.flatnonzero(
-        (np.diff(wet.astype(np.int8)) != 0) | (np.abs(np.diff(left)) > 5e-5) | (np.abs(np.diff(right)) > 5e-5)
-    )
-    edges = [0, *(change + 1).tolist(), wet.size]
-    if len(edges) > 400:  # measured depths that vary: mean of each wet stretch
-        edges = [0, *(np.flatnonzero(np.diff(wet.astype(np.int8))) + 1).tolist(), wet.size]
+    ends = np.diff(wet.astype(np.int8)) != 0
+    change = ends | (np.abs(np.diff(left)) > 5e-5) | (np.abs(np.diff(right)) > 5e-5)
+    if change.sum() > 398:  # measured depths that vary: mean of each wet stretch
+        change = ends
     return tuple(
         Lane(
-            a * dt,
-            b * dt,
-            in_metres=False,
-            depth_left=float(left[a:b].mean()),
-            depth_right=float(right[a:b].mean()),
-            irregularity_left=0.0,
-            irregularity_right=0.0,
+            a * dt, b * dt, in_metres=False, depth_left=float(left[a:b].mean()), depth_right=float(right[a:b].mean()),
+            irregularity_left=0.0, irregularity_right=0.0,
         )
-        for a, b in pairwise(edges)
-        if b > a and wet[a]
-    )
+        for a, b in pairwise([0, *(np.flatnonzero(change) + 1).tolist(), wet.size]) if b > a and wet[a]
+    )  # fmt: skip
 
 
 def _depth(course: Course) -> FloatArray:
@@ -375,18 +355,12 @@ def floating(
 ) -> BoolArray:  # fmt: skip
     """Samples (n,) in which a wheel may float, and whose residual is not judged; all False on a dry course.
 
-    A wheel that has lost its grip is bistable. Unknown differences of the water decide whether and when it spins down
-    in a puddle, and when it recovers. Its speed can then be tens of m/s away from the simulation: chance, no error of
-    the model. `columns` (n,): wheels that are not logged are taken from the simulation alone, led along the course at
-    the velocity `v` [m/s]; of each of `models`, as it is, and with twice the lost contact.
-
-    A span begins where a wheel loses its grip, measured or in any simulation. It ends when the stretch of water is
-    over and the car has recovered. A wheel that floats a little less also floats a little later.
+    Chance decides whether and when a wheel without grip spins down, and when it recovers: no error of the model. A span
+    begins where a wheel loses its grip, measured (`columns` (n,), at the velocity `v` [m/s]) or in the simulation of
+    any of `models`. It ends when the stretch of water is over and the car has recovered.
     """
     out: BoolArray = np.zeros(v.shape, dtype=bool)
-    if not course.lanes:
-        return out
-    for shown in (columns, *(follow(vehicle, course, m) for m in models)):
+    for shown in (columns, *(follow(vehicle, course, m) for m in models)) if course.lanes else ():
         if all(f"omega_{w}" in shown for w in WHEELS):
             speed = shown.get("v_x", v)
             # over a speed that is not too small: a standing car does not slip

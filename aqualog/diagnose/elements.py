@@ -1,8 +1,5 @@
-"""Intervals, patches and waves: unknown forms of few values over time and place.
-
-A smooth function of time with a dozen values cannot be distinguished from slow noise. Offsets that begin and end, a
-patch that comes again, or a wave of one length, say the same with few values, which slow noise cannot do.
-"""
+"""Intervals, patches and waves: unknown forms of few values over time and place. A smooth function of time with a dozen
+values cannot be distinguished from slow noise; these say the same with few, which slow noise cannot do."""
 
 from __future__ import annotations
 
@@ -36,9 +33,6 @@ LEAST_PERIODS = 0.5  # half a wave is a drift
 RATES = 50  # waves at a time, to spare memory
 
 
-Key = tuple[str, str]  # mechanism and coordinate
-
-
 class _Found(NamedTuple):
     kind: str
     manner: str
@@ -47,10 +41,8 @@ class _Found(NamedTuple):
 
 
 def with_elements(arena: Arena) -> Arena:
-    """The arena with the interval and the wave of each mechanism that explain most beside the tolerances.
-
-    They are sought in the metric of white noise: what is slow must not count as noise here.
-    """
+    """The arena with the interval and the wave of each mechanism that explain most beside the tolerances, in the metric
+    of white noise: what is slow must not count as noise here."""
     if len(arena.parts) > 1:
         return arena
     part = arena.parts[0]
@@ -62,29 +54,26 @@ def with_elements(arena: Arena) -> Arena:
     left = clipped(white @ (part.residual - arena.made(0, deviations[None])[0]), used)
     drive = arena.evidence.drives[part.drive]
     along = {n: drive.coordinates[n][part.at] for n in ("t", "position") if n in drive.coordinates}
-    sought: list[tuple[Mechanism, FloatArray, FloatArray]] = []
-    for m in MECHANISMS:
-        if m.is_road or m.source not in part.responses or not any((n,) in m.over for n in along):
-            continue
-        sought.append((m, *against(white @ part.responses[m.source], left, used)))
+    sought = [
+        (m, *against(white @ part.responses[m.source], left, used)) for m in MECHANISMS
+        if not m.is_road and m.source in part.responses and any((n,) in m.over for n in along)
+    ]  # fmt: skip
 
-    def over(name: str) -> tuple[dict[Key, _Found | None], dict[Key, _Found | None]]:
+    def over(name: str) -> dict[tuple[str, str], tuple[_Found | None, _Found | None]]:
         """Waves and patches over one coordinate: they are made once for all mechanisms."""
         own = [s for s in sought if (name,) in s[0].over]
-        keys = [(m.name, name) for m, _, _ in own]
-        weights, scores = np.array([s[1] for s in own]), np.array([s[2] for s in own])
-        waves, patches = _waves(name, along[name], weights, scores, used), _patches(name, along[name], weights, scores)
-        return dict(zip(keys, waves, strict=True)), dict(zip(keys, patches, strict=True))
+        x, weights, scores = along[name], np.array([s[1] for s in own]), np.array([s[2] for s in own])
+        both = zip(_waves(name, x, weights, scores, used), _patches(name, x, weights, scores), strict=True)
+        return dict(zip([(m.name, name) for m, _, _ in own], both, strict=True))
 
-    looked = beside(over, along)
-    waves, patches = ({k: v for each in looked for k, v in each[i].items()} for i in range(2))
+    looked = {k: both for each in beside(over, along) for k, both in each.items()}
 
     def of(s: tuple[Mechanism, FloatArray, FloatArray]) -> list[tuple[Mechanism, _Found]]:
         m, weight, score = s
-        several = intervals(weight, score)
-        found = [waves.get((m.name, n)) for n in along]
+        several, both = intervals(weight, score), [looked.get((m.name, n), (None, None)) for n in along]
+        found = [wave for wave, _ in both]
         found += [_stepped(along["t"], several[:k]) for k in sorted({1, len(several)} - {0})]
-        found += [patches.get((m.name, n)) for n in along]
+        found += [patches for _, patches in both]
         return [(m, f) for f in found if f is not None]
 
     return _extended(arena, list(chain.from_iterable(beside(of, sought))))
@@ -98,17 +87,13 @@ def _extended(arena: Arena, made: Sequence[tuple[Mechanism, _Found]]) -> Arena:
         own = tuple(range(n, n + k))
         # one of all that were tried is left
         usual = math.log(SHAPE_PRIOR / max(each, 1)) - math.log(f.tried)
-        blocks.append(
-            Block(f"{m.name}({f.kind} of {f.basis.names[0]})", "shape", own, f.basis.prior, usual, len(shapes))
-        )
+        key = f"{m.name}({f.kind} of {f.basis.names[0]})"
+        blocks.append(Block(key, "shape", own, f.basis.prior, usual, len(shapes)))
         shapes.append(Shape(m, f.basis.names, f.basis, f.manner))
         sd.append(np.full(k, m.usual))
         n += k
-    tolerance = np.zeros((n, n))
-    tolerance[: arena.sd.size, : arena.sd.size] = arena.tolerance
-    return replace(
-        arena, shapes=tuple(shapes), blocks=tuple(blocks), sd=np.concatenate(sd), tolerance=tolerance
-    )  # fmt: skip
+    tolerance = np.pad(arena.tolerance, (0, n - arena.sd.size))
+    return replace(arena, shapes=tuple(shapes), blocks=tuple(blocks), sd=np.concatenate(sd), tolerance=tolerance)
 
 
 def _stepped(t: FloatArray, edges: Sequence[tuple[int, int, int]]) -> _Found:
@@ -161,11 +146,8 @@ def _fold(x, low, high, rates, weights, scores, where):  # type: ignore[no-untyp
                     gain = (b - a / total * right) ** 2 / max(a * (1.0 - a / total), 1e-9 * total)
                     if gain > best[k]:
                         best[k] = gain
-                        where[k, 0], where[k, 1], where[k, 2] = (
-                            low + i / PHASES * period,
-                            (j + 1) / PHASES * period,
-                            period,
-                        )
+                        where[k, 0], where[k, 1] = low + i / PHASES * period, (j + 1) / PHASES * period
+                        where[k, 2] = period
 
 
 def _patch(
@@ -192,10 +174,8 @@ def _patch(
     start, length, period = now
     own = column(now)
     points = np.linspace(low, low + span, 8 * POINTS)
-    at_points = np.asarray(np.mod(points - start, period) < length, dtype=np.float64)
-    basis = Basis(
-        (name,), own[:, None], np.eye(1), points[:, None], at_points[:, None], np.ones(points.size, dtype=bool)
-    )
+    there = np.asarray(np.mod(points - start, period) < length, dtype=np.float64)[:, None]
+    basis = Basis((name,), own[:, None], np.eye(1), points[:, None], there, np.ones(points.size, dtype=bool))
     unit = "m" if name == "position" else "s"
     return _Found("patches", f"for {length:.3g} {unit} in every {period:.4g} {unit}", basis, count)
 
@@ -233,10 +213,8 @@ def _waves(
 
 
 def _gains(rates: FloatArray, z: FloatArray, weights: FloatArray, scores: FloatArray) -> FloatArray:
-    """`gain_of` cosine and sine of each rate (F,) over z (n,), for each row of weights (k, n). (F, k)
-
-    Their inner products are sums over the wave and over that of twice the rate.
-    """
+    """`gain_of` cosine and sine of each rate (F,) over z (n,), for each row of weights (k, n). (F, k) Their inner
+    products are sums over the wave and over that of twice the rate."""
     out = np.zeros((rates.size, len(weights)))
     all_w, all_s = weights.sum(axis=1), scores.sum(axis=1)
     for i in range(0, rates.size, RATES):

@@ -25,10 +25,8 @@ FARTHEST = 2.0  # standard deviations, beyond which a fault is likelier than an 
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Drives with their residuals (C, n) and the columns of signatures (K, C, n): one for each free parameter.
-
-    `columns[i]` are the columns of hypothesis i.
-    """
+    """Drives with their residuals (C, n) and the columns of signatures (K, C, n), one for each free parameter;
+    `columns[i]` are those of hypothesis i."""
 
     drives: tuple[Drive, ...]
     asked: tuple[Hypothesis, ...]
@@ -57,12 +55,9 @@ class Evidence:
 
 
 def make_evidence(
-    drives: Sequence[Drive],
-    asked: Sequence[Hypothesis],
-    residuals: Sequence[FloatArray],
-    signatures: Sequence[Sequence[FloatArray]],
-    model: Model,
-) -> Evidence:
+    drives: Sequence[Drive], asked: Sequence[Hypothesis], residuals: Sequence[FloatArray],
+    signatures: Sequence[Sequence[FloatArray]], model: Model,
+) -> Evidence:  # fmt: skip
     """Columns of all hypotheses about the model at hand."""
     columns: list[tuple[int, ...]] = []
     sought = [h for h in asked if not (h.allowed or h.effect.drive.begins_like)]
@@ -96,10 +91,7 @@ def make_evidence(
 
 
 class Forgiven(NamedTuple):
-    """Inner products (K + 1, K + 1) that forgive deviations.
-
-    `room`: half the log determinant of unit noise and deviations together.
-    """
+    """Inner products (K + 1, K + 1) that forgive deviations; `room`: half log determinant of noise and deviations."""
 
     gram: FloatArray
     room: float
@@ -107,12 +99,9 @@ class Forgiven(NamedTuple):
 
 def forgiving(gram: FloatArray, tolerance: FloatArray) -> Forgiven:
     """Inner products of K columns, or of these and residuals, with themselves and any number of residuals, in a metric
-    that tolerates deviations of covariance `tolerance` (K, K).
-
-    No vehicle file is exact and no simulator is the car: a radius may be 0.03 % off, a tyre's curve a few percent. With
-    enough samples every such error is significant. The covariance of the residual is that of the noise plus that of all
-    these deviations, I + X P X'. Woodbury's identity gives the inner products with its inverse.
-    """
+    that tolerates deviations of covariance `tolerance` (K, K). With enough samples every small error of a file or a
+    simulator is significant. The covariance of the residual is that of the noise and these deviations, I + X P X',
+    whose inverse Woodbury's identity gives."""
     k = np.flatnonzero((np.diag(tolerance) > 0.0) & (np.diag(gram)[: len(tolerance)] > 1e-12))
     P = tolerance[np.ix_(k, k)]
     root = np.linalg.cholesky(P + 1e-14 * np.diag(np.diag(P)))
@@ -127,12 +116,10 @@ def tolerant(evidence: Evidence, gram: FloatArray) -> FloatArray:
 
 
 def recentred(evidence: Evidence, model: Model) -> Model:
-    """The model with the file's own values where these drives most likely have them, if that is far from the file.
-
-    Signatures are straight lines from the values at hand. A gain that is 10 % off bends them by more than the noise,
-    and the bend would get a name. The deviations theta = (S^-2 + A'A)^-1 A'y stay as unsure as they were, around the
-    new values. The noise is estimated again after a first round, in which the deviations still count as noise.
-    """
+    """The model with the file's own values where these drives most likely have them, if that is far from the file: a
+    gain that is 10 % off bends signatures, and the bend would get a name. The deviations theta = (S^-2 + A'A)^-1 A'y
+    stay as unsure as they were. The noise is estimated again after a first round, in which the deviations still count
+    as noise."""
     car = evidence.drives[0].vehicle
     names = [(h, n) for h in evidence.asked for n in h.free]
     if not any(FARTHEST * deviation(h, n, car) >= h.worth_naming(n) for h, n in names):
@@ -147,12 +134,8 @@ def recentred(evidence: Evidence, model: Model) -> Model:
             gram += rows @ rows.T
         inner = gram[np.ix_(k, k)] + np.diag(evidence.forgiven[k] ** -2.0)
         theta = dict(zip(k.tolist(), np.linalg.solve(inner, gram[k, -1]).tolist(), strict=True))
-    moved = []
-    for c, off in theta.items():
-        h, n = names[c]
-        if (
-            h.worth_naming(n) <= abs(off) <= FARTHEST * deviation(h, n, car)
-            and evidence.low[c] < off < evidence.high[c]
-        ):
-            moved.append((h, {n: value_in(model, h, n) + off}))
-    return with_values(model, moved)
+    within = [(*names[c], off) for c, off in theta.items() if evidence.low[c] < off < evidence.high[c]]
+    return with_values(model, [
+        (h, {n: value_in(model, h, n) + off}) for h, n, off in within
+        if h.worth_naming(n) <= abs(off) <= FARTHEST * deviation(h, n, car)
+    ])  # fmt: skip

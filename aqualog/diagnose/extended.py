@@ -45,20 +45,13 @@ class Extended(NamedTuple):
 
 
 def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extended:
-    """Signals as loaded with `vehicle`, and vehicle, for the detectors, with the terms of a model taken into account.
+    """Signals as loaded with `vehicle`, and vehicle, for the detectors, with the terms of a model taken into account;
+    the given objects themselves if there are none, or only neutral ones.
 
-    Each term acts on the simulation of the dry car of the vehicle file; the changed values are read back. Terms for
-    which the vehicle file has a key change the vehicle: mass and its position, drag area, rolling resistance (with
-    dragging brakes), inertias, radii, slip slopes. Other terms change the signals. A sensor's error is removed. A wheel
-    whose radius differs from its axle's is converted to that radius. A force that slows the car (wind, trailer, cold
-    tyres, curves) is added to the accelerometer, which then shows the car without it. Such a force is a slow change of
-    about 0.1 m/s², which the velocity observer learns as an offset anyway. The given objects themselves if the model
-    has no terms or only neutral ones.
-
-    Raises
-    ------
-    ConfigError
-        If a term leads to a value outside the limits of a vehicle file.
+    Terms for which the vehicle file has a key change the vehicle; ConfigError if beyond its limits. Others change the
+    signals: a sensor's error is removed, a wheel whose radius differs from its axle's is converted to that radius. A
+    force that slows the car (wind, trailer, cold tyres, curves) is added to the accelerometer, which then shows the car
+    without it.
     """
     # the simulation of the vehicle file, with perfect sensors on the buses of a series car
     worn = TYRES["worn_summer"]
@@ -76,9 +69,8 @@ def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extende
     if new:
         import polars as pl
 
-        signals = replace(
-            signals, frame=signals.frame.with_columns([pl.Series(s, x, nan_to_null=True) for s, x in new.items()])
-        )
+        changed = [pl.Series(s, x, nan_to_null=True) for s, x in new.items()]
+        signals = replace(signals, frame=signals.frame.with_columns(changed))
     return Extended(signals, car, tuple(dict.fromkeys(notes)))
 
 
@@ -101,11 +93,8 @@ class _Measured(NamedTuple):
 
 
 def _undo_sensors(measured: _Measured, sensors: Sensors) -> None:
-    """Remove sensor errors from a signal: gain, bias and drift, then its delay and the drift of its clock.
-
-    A late signal is moved by whole samples. Interpolated samples would have less noise than the detectors of wheel
-    vibration expect.
-    """
+    """Remove sensor errors from a signal: gain, bias and drift, then its delay and the drift of its clock, by whole
+    samples: interpolated ones would have less noise than the detectors of wheel vibration expect."""
     t, columns = measured.t, measured.columns
     for name, c in sensors.channels.items():
         if c != Channel() and name in columns:
@@ -127,9 +116,8 @@ def _notes(term: Term, base: Setup, measured: _Measured) -> list[str]:
     after = term.apply(base)
     changed = _changed(base.plant, after.plant)
     acts_on = {n for n, c in after.sensors.channels.items() if c != base.sensors.channels.get(n, Channel())}
-    acts_on |= {
-        n for b, a in zip(base.sensors.groups, after.sensors.groups, strict=True) if a != b for n in a.signals
-    }  # fmt: skip
+    groups = zip(base.sensors.groups, after.sensors.groups, strict=True)
+    acts_on |= {n for before, now in groups if now != before for n in now.signals}
     if acts_on:
         if "ahead" in term.values and "yaw_rate" not in measured.columns:
             return [f"{name}: the log has no yaw_rate; not used"]
@@ -156,16 +144,14 @@ def _vehicle(vehicle: Vehicle, before: Plant, after: Plant, notes: list[str]) ->
             mean = 0.5 * (now[i] + now[j]) if now[i] != now[j] else now[i]
             new[key] = float(getattr(vehicle, key) * (mean / old[i])) if at_tyre else float(mean)
             if now[i] != now[j] and name in ("inertia", "slip_slope"):
-                notes.append(
-                    f"model: {name} of the {'front' if axle == 'f' else 'rear'} axle is the mean of its wheels"
-                )
+                where = "front" if axle == "f" else "rear"
+                notes.append(f"model: {name} of the {where} axle is the mean of its wheels")
     if changed & {"r_w", "brake_drag"}:
         new["rolling_resistance"] = _rolling_resistance(after)
     for k in KEYS.values():
         if k.name in new and not k.low <= new[k.name] <= k.high:
-            raise ConfigError(
-                f"the model makes {k.path} = {new[k.name]:g} {k.unit}", expected=f"{k.low:g} ... {k.high:g}"
-            )
+            what = f"the model makes {k.path} = {new[k.name]:g} {k.unit}"
+            raise ConfigError(what, expected=f"{k.low:g} ... {k.high:g}")
     return replace(vehicle, **new) if new else vehicle  # type: ignore[arg-type]
 
 

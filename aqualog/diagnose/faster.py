@@ -35,6 +35,7 @@ SOUND = 20.0  # cars without a fault of this kind for one with it (K)
 # amplitude from which a wheel may be odd, and how many times that of any other wheel: on a measured sound car all four
 # vary alike, by up to 0.12 % once per turn (D)
 ODD, TIMES = 1e-3, 3.0
+_OFTEN = {1: "once", 2: "twice", 3: "3 times"}  # by the order
 _RING = EFFECTS["tone_ring"]
 _AMPLITUDE = _RING.parameters[0]
 
@@ -51,11 +52,8 @@ class Faster(NamedTuple):
 
 
 def faster(drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, model: Model, *, seed: int = 1) -> Faster:
-    """Look at the signals of one car in one state at their own rate.
-
-    Rings that the `model` has are known, and are no finding at that size; `seed`: of the permutations that calibrate
-    the search for seams.
-    """
+    """Look at the signals of one car in one state at their own rate. Rings that the `model` has are no finding at that
+    size; `seed`: of the permutations that calibrate the search for seams."""
     found = pooled([per_turn(wheel_columns(s), s.dt, s.origins) for _, s in drives])
     sharp = limits(found)
     found = without_known(found, _known(model))
@@ -98,10 +96,8 @@ def _known(model: Model) -> dict[str, float]:
 
 
 def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
-    """What is found once per turn as causes `tone_ring`, those of an axle or a side with one value together.
-
-    Larger than the effect's smallest size only; `remarks` has the rest.
-    """
+    """What is found once per turn as causes `tone_ring`, larger than the effect's smallest size, those of an axle or a
+    side with one value together."""
     rings = {f.wheel: f for f in found if f.order == 1 and f.kind == "ring" and f.amplitude >= _AMPLITUDE.smallest}
     out = []
     for where, wheels in (*AXLES.items(), *SIDES.items()):
@@ -117,25 +113,22 @@ def to_causes(found: Sequence[PerTurn]) -> tuple[Cause, ...]:
         half = 0.5 * math.sqrt(sum((f.high - f.low) ** 2 for f in pair)) / len(pair)
         half = math.hypot(half, Z95 * DOUBT * mean)  # filters of control units and loggers
         value = Estimate(mean, max(mean - half, 0.0), mean + half, _AMPLITUDE.unit)
-        parameters = {_AMPLITUDE.name: value}
-        channels = tuple(f"omega_{f.wheel}" for f in pair)
-        sentence = cause_sentence(_RING, where, parameters)
-        causes.append(Cause(_RING.name, where, parameters, channels, sentence, _probability(pair, value)))
+        own, channels = {_AMPLITUDE.name: value}, tuple(f"omega_{f.wheel}" for f in pair)
+        sentence = cause_sentence(_RING, where, own)
+        causes.append(Cause(_RING.name, where, own, channels, sentence, _probability(pair, value)))
     return tuple(causes)
 
 
 def odd_wheels(found: Sequence[PerTurn]) -> tuple[Remainder, ...]:
-    """Wheels whose speed varies with their angle much more than any other wheel's, and not as a ring makes it.
-
-    A force or torque that comes with every turn, a tyre out of true, an uneven pick-up: the log does not show which.
-    """
+    """Wheels whose speed varies with their angle much more than any other wheel's, and not as a ring makes it: a force
+    with every turn, a tyre out of true, an uneven pick-up."""
     out = []
     angle: FloatArray = np.linspace(0.0, 2.0 * math.pi, POINTS)
     for f in found:
         times = _times(f, found)
         if not times:
             continue
-        how = f"the speed of wheel {f.wheel.upper()}, varying {_often(f.order)} per turn by {f.amplitude:.2%}, "
+        how = f"the speed of wheel {f.wheel.upper()}, varying {_OFTEN[f.order]} per turn by {f.amplitude:.2%}, "
         how += f"{times:.0f} times as much as any other wheel's"
         p = tempered(1.0 / (1.0 - SOUND * math.e * f.p_value * math.log(max(f.p_value, 1e-300))))
         said = f"Unexplained: {how} (probability {p:.2f})."
@@ -153,10 +146,6 @@ def _times(f: PerTurn, found: Sequence[PerTurn]) -> float:
     others = [o.amplitude for o in found if o.order == f.order and o.wheel != f.wheel and o.kind != "untested"]
     times = f.amplitude / max(*others, 1e-5) if others and f.found and not is_ring else 0.0
     return times if f.amplitude >= ODD and times >= TIMES else 0.0
-
-
-def _often(order: int) -> str:
-    return {1: "once", 2: "twice"}.get(order, f"{order} times")
 
 
 def limits(found: Sequence[PerTurn]) -> tuple[Limit, ...]:
@@ -177,11 +166,8 @@ def limits(found: Sequence[PerTurn]) -> tuple[Limit, ...]:
 
 
 def _probability(wheels: Sequence[PerTurn], value: Estimate) -> float:
-    """That it is there and larger than what sound wheels show.
-
-    There: from the p-value of each wheel by the bound -e p ln p on the evidence for chance [sellke2001]. Larger: from
-    the interval, as of a normal distribution.
-    """
+    """That it is there, by the bound -e p ln p of each wheel's p-value on the evidence for chance [sellke2001], and
+    larger than what sound wheels show, by the interval as of a normal distribution."""
     there = 1.0
     for f in wheels:
         p = min(max(f.p_value, 1e-300), math.exp(-1.0))
@@ -232,7 +218,7 @@ def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
     for f in found:
         if not f.found or (f.most if f.kind == "speed" else f.amplitude) < SHOWN or _times(f, found):
             continue
-        what = f"The wheel speed{place(f.wheel)} varies {_often(f.order)} per turn by {f.amplitude:.2%}"
+        what = f"The wheel speed{place(f.wheel)} varies {_OFTEN[f.order]} per turn by {f.amplitude:.2%}"
         if f.kind == "speed":
             out.append(f"{what}; {f.reason or 'not at all speeds'}: a resonance or the tyre, not the tone ring.")
         elif f.order > 1:

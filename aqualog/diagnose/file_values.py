@@ -1,7 +1,5 @@
-"""How far a vehicle file's values may be off, and differ from drive to drive, in the parameters of effects.
-
-The key stands in the effect's row: `DayToDay.key` of the whole car, `DriveSearch.axle_key` of an axle.
-"""
+"""How far a vehicle file's values may be off, and differ from drive to drive, in the parameters of effects; the key
+stands in the effect's row (`DayToDay.key` of the whole car, `DriveSearch.axle_key` of an axle)."""
 
 from __future__ import annotations
 
@@ -26,10 +24,8 @@ _MATTERS = ("mass", "torque_gain", "wheels.r_e_f", "wheels.r_e_r")
 
 
 def key_of(h: Hypothesis, name: str) -> str:
-    """The key of the vehicle file (`wheels.r_e_f`) whose own value a parameter changes; empty without one.
-
-    Each key counts at one place: that of the whole car there, that of an axle at the axle.
-    """
+    """The key of the vehicle file (`wheels.r_e_f`) whose own value a parameter changes, that of the whole car there,
+    that of an axle at the axle; empty without one."""
     p, start = h.parameter(name), h.effect.drive.axle_key
     if h.where is None and p.day_to_day is not None:
         return p.day_to_day.key
@@ -37,13 +33,9 @@ def key_of(h: Hypothesis, name: str) -> str:
 
 
 def deviation(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
-    """Standard deviation of the file's own value, in the unit of an effect's parameter; 0 where no key holds it.
-
-    The value of a key, of a known fault, or of both. Every drive has it, no drive alone.
-
-    A share of the value where the parameter multiplies it (`torque_gain`, `tyre_radius`), else in the key's unit.
-    Differences between drives (`day_to_day`) are not in it, and independent of it.
-    """
+    """Standard deviation of the file's own value, of a key, of a known fault, or of both; 0 without, and of one drive
+    alone. A share of the value where the parameter multiplies it (`torque_gain`, `tyre_radius`), else in the key's
+    unit. Differences between drives (`day_to_day`) are independent of it."""
     if h.drive:
         return 0.0
     path, known = key_of(h, name), vehicle.known.get(h.key)
@@ -56,12 +48,9 @@ def deviation(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
 
 
 def own_sd(vehicle: Vehicle, path: str) -> float:
-    """Standard deviation of the file's own value of a key, in the key's unit; 0 for a mass and a gain that are bound.
-
-    A balance of forces shows the ratio of mass and torque gain. Once drives have calibrated one of them, that ratio is
-    known. Both may be off together, which no drive shows. A file that says of no value where it comes from is taken at
-    its word, defaults of the whole car included; only axles whose key it does not set are those of another car.
-    """
+    """Standard deviation of the file's own value of a key, in the key's unit; 0 for a mass and a gain that are bound:
+    once drives have calibrated one of them, their ratio is known. A file that says of no value where it comes from is
+    taken at its word; only axles whose key it does not set are those of another car."""
     if not vehicle.provenance and (path in vehicle.given or not path.endswith(("_f", "_r"))):
         return 0.0
     bound = ("mass", "torque_gain")
@@ -79,19 +68,15 @@ def with_known(model: Model, vehicle: Vehicle) -> Model:
 
 
 def calibrated_enough(vehicle: Vehicle) -> tuple[str, ...]:
-    """The keys that matter for a diagnosis and are guesses: mass, torque gain and radii; empty if it is enough.
-
-    A mass that is calibrated binds the torque gain: the drives have shown their ratio.
-    """
+    """The keys that matter for a diagnosis and are guesses: mass, torque gain, which a calibrated mass binds, and
+    radii."""
     bound = {"torque_gain"} if provenance_of(vehicle, "mass").source == "calibrated" else set()
     return tuple(p for p in _MATTERS if provenance_of(vehicle, p).source == "guess" and p not in bound)
 
 
 def not_calibrated(vehicle: Vehicle, channels: Collection[str]) -> str:
-    """The sentence for a file that is not calibrated enough for these channels, and what to do; empty if it is.
-
-    Without a torque neither mass nor torque gain matter, and no drive calibrates them.
-    """
+    """The sentence for a file that is not calibrated enough for these channels, and what to do; empty if it is. Without
+    a torque neither mass nor torque gain matter."""
     needs = {"mass": "force_balance", "torque_gain": "force_balance"}
     keys = [k for k in calibrated_enough(vehicle) if needs.get(k, "slip") in " ".join(channels)]
     if not keys:
@@ -106,11 +91,9 @@ def not_calibrated(vehicle: Vehicle, channels: Collection[str]) -> str:
 
 
 def day_to_day(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
-    """Standard deviation of a parameter from drive to drive, in the effect's unit; 0 where the file gives no value.
-
-    Applies to the whole car only: wind, surface, temperature and the torque's estimate do not act on a single axle.
-    Each key of the file counts here once. A load of one of several drives looks like that drive's own error of torque.
-    """
+    """Standard deviation of a parameter from drive to drive, in the effect's unit; 0 where the file gives no value, and
+    at a single axle. Each key of the file counts here once. A load of one of several drives looks like that drive's own
+    error of torque."""
     row = h.parameter(name).day_to_day
     if row is None or h.where is not None:
         return 0.0
@@ -123,10 +106,8 @@ def day_to_day(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
 
 
 def as_value(h: Hypothesis, name: str, vehicle: Vehicle, speed: float) -> float:
-    """Day-to-day differences of its kind and errors of the file, as a standard deviation of one of its parameters.
-
-    In the parameter's unit; `speed`: at which its drag counts [m/s].
-    """
+    """Day-to-day differences of its kind and errors of the file, as a standard deviation of one of its parameters, in
+    its unit; `speed`: at which its drag counts [m/s]."""
     row = h.parameter(name).day_to_day
     own = deviation(h, name, vehicle)
     if row is None:

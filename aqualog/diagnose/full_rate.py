@@ -1,9 +1,6 @@
-"""What repeats with every turn of a wheel, at the log's own rate: rings, wheels and tyres that are uneven.
-
-Blocks of 0.1 s hold one to two turns, so the residuals of the search show nothing of it. Here each wheel speed is
-compared with its own mean over a second, over the wheel's own angle. Orders next to a whole one are the null: they have
-the noise of the same frequencies, whatever its colour.
-"""
+"""What repeats with every turn of a wheel, at the log's own rate: rings, wheels and tyres that are uneven. Each wheel
+speed is compared with its own mean over a second, over the wheel's own angle. Orders next to a whole one are the null:
+they have the noise of the same frequencies, whatever its colour."""
 
 from __future__ import annotations
 
@@ -43,12 +40,10 @@ Kind = Literal["ring", "speed", "nothing", "untested"]
 
 @dataclass(frozen=True, slots=True)
 class PerTurn:
-    """What one wheel's speed has of one order: `amplitude` relative to the speed, with its 95 % interval.
-
-    `p_value`: of so much by chance anywhere in the drive, over all wheels and orders. `kind`: `ring` if the relative
-    amplitude is the same at low and high speed, `speed` if not, with the largest of the thirds by speed as `most`;
-    `untested` with the `reason`.
-    """
+    """What one wheel's speed has of one order: `amplitude` relative to the speed, with its 95 % interval; `p_value`: of
+    so much by chance anywhere in the drive, over all wheels and orders. `kind`: `ring` if the relative amplitude is the
+    same at low and high speed, `speed` if not, with the largest of the thirds by speed as `most`; `untested` with the
+    `reason`."""
 
     wheel: str
     order: int
@@ -67,11 +62,9 @@ class PerTurn:
 
 
 class _Wheel(NamedTuple):
-    """A wheel speed at its own step: mean and relative rest (m,), weight 1 / variance of the rest, angle [turns].
-
-    `rate` [Hz]: at which the bus has it; `lines`: time between samples that straight lines connect, else 0. [s]
-    `between`: as in `Origin`.
-    """
+    """A wheel speed at its own step: mean and relative rest (m,), weight 1 / variance of the rest, angle [turns];
+    `rate` [Hz] at which the bus has it; `lines`: time between samples that straight lines connect, else 0 [s];
+    `between`: as in `Origin`."""
 
     dt: float
     rate: float
@@ -84,10 +77,8 @@ class _Wheel(NamedTuple):
 
 
 class _Sum(NamedTuple):
-    """Sums over blocks of turns: weight (b,), transforms (b, j) at the orders `offset` (j,) beside the whole one.
-
-    `speed` (b,): mean [rad/s].
-    """
+    """Sums over blocks of turns: weight (b,), transforms (b, j) at the orders `offset` (j,) beside the whole one,
+    `speed` (b,) mean [rad/s]."""
 
     weight: FloatArray
     transform: np.ndarray[tuple[int, int], np.dtype[np.complex128]]
@@ -113,16 +104,14 @@ def wheel_columns(signals: Signals) -> dict[str, FloatArray]:
 def per_turn(
     columns: Mapping[str, FloatArray], dt: float, origins: Mapping[str, Origin]
 ) -> tuple[PerTurn, ...]:  # fmt: skip
-    """What repeats with every turn, half and third of a turn of each wheel: one for each wheel and order.
+    """What repeats with every turn, half and third of a turn of each wheel: one for each wheel and order. `columns`:
+    `omega_*` (n,) [rad/s] at the step `dt` [s], not averaged, NaN where a sample is missing; `origins`: rate of each
+    signal on its bus, and its unit.
 
-    `columns`: `omega_*` (n,) [rad/s] at the step `dt` [s], not averaged, NaN where a sample is missing; `origins`: rate
-    of each signal on its bus, and its unit.
-
-    The angle is the integral of the wheel speed itself, so delays do not matter. Its noise makes the angle drift: sums
-    over the whole drive and over 512, 64 and 16 turns compete. A control unit averages over nothing up to the period of
-    its reports: the interval covers both. What lines between samples and grid take is put back. Limits: a tyre that
-    runs out of true looks like a ring; a speed that is rounded without noise hides what is smaller than half a step; a
-    logger that put all channels on one time base has taken a part of the amplitude with it.
+    A control unit averages over nothing up to the period of its reports: the interval covers both. What lines between
+    samples and grid take is put back. Limits: a tyre that runs out of true looks like a ring; a speed that is rounded
+    without noise hides what is smaller than half a step; a logger that put all channels on one time base has taken a
+    part of the amplitude with it.
     """
     found = []
     for w in WHEELS:
@@ -152,12 +141,10 @@ def _prepared(x: FloatArray, dt: float, origin: Origin | None) -> _Wheel | str:
         changes = np.flatnonzero(np.diff(x) != 0.0) + 1
         first = int(np.bincount(changes % held, minlength=held).argmax())
         x, dt = x[first::held], held * dt
-    rate = 1.0 / dt
-    lines = 0.0
+    rate, lines = 1.0 / dt, 0.0
     between = origin.between if origin is not None and held <= 1 else 0.0  # held samples are taken as they are
     if origin is not None and 0.0 < origin.rate_hz < 0.8 * rate:
-        rate = origin.rate_hz
-        lines = 1.0 / rate
+        rate, lines = origin.rate_hz, 1.0 / origin.rate_hz
     good = np.isfinite(x)
     if good.sum() * dt < 2.0 * SPEED_S or 0.5 * NYQUIST * rate <= LEAST_HZ:
         return f"the wheel speeds come at {rate:.3g} Hz" if good.any() else "no wheel speed"
@@ -213,12 +200,9 @@ def _best(part: _Wheel, order: int, gain: FloatArray, slack: float) -> _Fit | st
     filled = np.unique(place_of // BINS).size
     if filled < LEAST_TURNS:
         return f"{filled} turns at usable speeds, {LEAST_TURNS} are needed"
-    fits = []
-    for length in (turns, *(b for b in BLOCKS if 2 * b <= turns)):
-        sums = _summed(part, order, gain, place_of, length, FINER if slack else 1)
-        fit = _fitted(sums, order * slack)
-        if fit is not None:
-            fits.append(fit)
+    lengths = (turns, *(b for b in BLOCKS if 2 * b <= turns))
+    sums = (_summed(part, order, gain, place_of, length, FINER if slack else 1) for length in lengths)
+    fits = [f for f in (_fitted(s, order * slack) for s in sums) if f is not None]
     if not fits:
         return "too few turns"
     best = max(fits, key=lambda f: f.log_p - math.log10(f.tries))
@@ -235,13 +219,9 @@ def _lossless(fits: Sequence[_Fit]) -> _Fit:
 
 
 def _summed(
-    part: _Wheel,
-    order: int,
-    gain: FloatArray,
-    place_of: np.ndarray[tuple[int], np.dtype[np.intp]],
-    length: int,
+    part: _Wheel, order: int, gain: FloatArray, place_of: np.ndarray[tuple[int], np.dtype[np.intp]], length: int,
     finer: int,
-) -> _Sum:
+) -> _Sum:  # fmt: skip
     """Sums over blocks of `length` turns; the transform over the bins of a block gives the orders beside the whole."""
     blocks = int(place_of[-1] // (BINS * length)) + 1
     size = blocks * length * BINS
@@ -294,12 +274,10 @@ def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) ->
     thirds = [by_speed[(share > a) & (share <= b + 1e-12)] for a, b in ((0.0, 1 / 3), (1 / 3, 2 / 3), (2 / 3, 1.0))]
     if min(t.size for t in thirds) < 2:
         return "", math.nan
-    parts = [
-        sums._replace(weight=sums.weight[i], transform=sums.transform[i], offset=sums.offset - sums.offset[at])
-        for i in thirds
-    ]
+    offset = sums.offset - sums.offset[at]
+    parts = (sums._replace(weight=sums.weight[i], transform=sums.transform[i], offset=offset) for i in thirds)
     fits = [f for f in (_fitted(p, 0.0) for p in parts) if f is not None]
-    if len(fits) < len(parts):
+    if len(fits) < len(thirds):
         return "", math.nan
     square, sd = (np.array([getattr(f, n) for f in fits]) for n in ("square", "sd"))
     square = np.maximum(square, 0.0)
@@ -310,11 +288,9 @@ def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) ->
     apart = max(speeds[high], speeds[low]) >= APART * min(speeds[high], speeds[low])
     if not apart or log_p < UNEQUAL_LOG_P or square[high] < UNEQUAL**2 * square[low]:
         return "", math.nan
-    reason = (
-        f"{math.sqrt(square[high]):.2%} at {speeds[high] / (2.0 * math.pi):.1f} turns a second and "
-        f"{math.sqrt(square[low]):.2%} at {speeds[low] / (2.0 * math.pi):.1f}"
-    )
-    return reason, math.sqrt(square[high])
+    most, least = math.sqrt(square[high]), math.sqrt(square[low])
+    turns = [speeds[i] / (2.0 * math.pi) for i in (high, low)]
+    return f"{most:.2%} at {turns[0]:.1f} turns a second and {least:.2%} at {turns[1]:.1f}", most
 
 
 def _held(x: FloatArray) -> int:

@@ -34,7 +34,7 @@ SPEED = "speed"
 
 
 class LogScoreGain(NamedTuple):
-    """Gain of the log score over all drives together, with its 95 % interval. [nats (natural logarithm)]"""
+    """Gain over all drives together, with its 95 % interval. [nats (natural logarithm)]"""
 
     value: float
     low: float
@@ -54,11 +54,9 @@ def measured_gain(
 
     `models`: as the file has it, the same at the car's likeliest values, and extended at its likeliest values. Errors
     fall from the first to the last; the log score is gained over the better of the first two, so that it is the
-    effects' alone. The likeliest values of one drive may let a wheel spin in another. Right effects gain half of what
-    they change squared, on average.
-    `noise`: of the diagnosed drive after its best set, one measure for all models; `seed` of the bootstrap;
-    `in_sample`: these are the diagnosed drives themselves. The channel `speed` is the error of a simulation that runs
-    free for half a minute [m/s].
+    effects' alone. Right effects gain half of what they change squared, on average. `noise`: of the diagnosed drive
+    after its best set; `in_sample`: these are the diagnosed drives themselves. The channel `speed` is the error of a
+    simulation that runs free for half a minute [m/s].
     """
     masks, names = [d.mask for d in drives], tuple(d.name for d in drives)
     # each model has its own target speed with which it meets the measured speed
@@ -107,27 +105,20 @@ def _free_speed(d: Drive, model: Model) -> FloatArray:
 
 
 def block_scores(z: FloatArray, dt: float) -> FloatArray:
-    """Log score (b,) of unit innovations (C, n) at steps `dt` [s], by blocks of 20 s; 0 where they are masked.
-
-    -z² / 2 without its constant, which a gain does not have. [nats (natural logarithm)] A remainder at the end belongs
-    to the last whole block; there is one block at least.
-    """
+    """Log score (b,) of unit innovations (C, n) at steps `dt` [s], by blocks of 20 s; 0 where they are masked. It is
+    -z² / 2 without its constant. [nats (natural logarithm)] A remainder at the end belongs to the last whole block."""
     score = -0.5 * np.square(z).sum(axis=0)
     length = max(1, round(BLOCK_S / dt))
     return np.asarray(np.add.reduceat(score, np.arange(max(1, score.size // length)) * length))
 
 
 def log_score_gain(before: Sequence[FloatArray], after: Sequence[FloatArray], *, seed: int) -> LogScoreGain:
-    """Gain of the log score with its interval, from the scores (b,) of the same blocks of each drive.
+    """Gain of the log score with its interval, from the scores (b,) of the same blocks of each drive; FitError if they
+    are not the same ones, or not finite.
 
     With `DRIVES_AS_UNITS` drives or more, or where a drive has a single block, whole drives are drawn again and the
     interval holds for another set of such drives. Else blocks of each drive are, and it holds for these drives.
     Deviations are widened by Student's t for few units. The interval is NaN with fewer than two units.
-
-    Raises
-    ------
-    FitError
-        If the blocks before and after are not the same ones, or not finite.
     """
     if len(before) != len(after) or any(x.shape != y.shape for x, y in zip(before, after, strict=True)):
         raise FitError("log scores before and after are not of the same blocks")

@@ -1,12 +1,9 @@
 """The road's profile: a slope angle over position that two channels show independently of each other.
 
-The accelerometer measures a slope, and so does the balance of wheels against torque. They share no slow sensor error:
-
     kinematic                  = g sin(theta(s)) + b    accelerometer minus dv/dt, b its drift
     kinematic - force_balance  = g sin(theta(s)) + w    torque minus dv/dt, w wind and torque error
 
-The velocity is in both, but its slow error is negligible: 0.05 m/s² over ten seconds would be 0.5 m/s. The part that
-both share over 150 m and more is the road.
+The velocity is in both, with little slow error. The part that both share over 150 m and more is the road.
 """
 
 from __future__ import annotations
@@ -50,13 +47,10 @@ BIAS_SD, FORCE_SD = 0.1, 0.05
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """A hilly road: slope angle `theta` [rad] over the knots `s` [m], (k,) each, uphill positive; its mean over the
-    drive is left out, because a constant could also be the accelerometer's offset.
-
-    `rms` and `mean` [rad] with 95 % intervals, no mean where something else has the constant; `shared`: correlation of
-    the two channels over 150 m, NaN without torque; `lap_m`: length after which the road repeats itself, None on one
-    pass; `drive`: its name, of several.
-    """
+    """A hilly road: slope angle `theta` [rad] over the knots `s` [m], (k,) each, uphill positive, without its mean over
+    the drive, which could also be the accelerometer's offset. `rms` and `mean` [rad] with 95 % intervals, no mean where
+    something else has the constant; `shared`: correlation of the two channels over 150 m, NaN without torque; `lap_m`:
+    length after which the road repeats itself, None on one pass; `drive`: its name, of several."""
 
     s: FloatArray
     theta: FloatArray
@@ -116,12 +110,9 @@ def with_profile(model: Model, profile: Profile) -> Model:
 
 
 def find_profile(drive: Drive, residual: FloatArray) -> Profile | None:
-    """The slope of the road along a drive, or None if the drive does not show one.
-
-    `residual` (C, n): of the drive's channels under the model at hand [m/s²]. With torque: the part that both channels
-    share, beyond chance and beyond 0.5 % rms. Without torque: only if a second pass shows the same profile, or beyond 2
-    % rms. Errors of mass, delays, scales and clocks follow the acceleration and are removed from both channels first.
-    """
+    """The slope of the road along a drive, or None if the drive does not show one. `residual` (C, n): of the drive's
+    channels under the model at hand [m/s²]. With torque: the part that both channels share, beyond chance and beyond
+    0.5 % rms. Without torque: only if a second pass shows the same profile, or beyond 2 % rms."""
     if "kinematic" not in drive.channels:
         return None
     bins = _Bins.of(drive, residual)
@@ -183,12 +174,9 @@ class _Bins:
         def mean(x: FloatArray) -> FloatArray:
             return np.asarray(np.bincount(where[good], x[good], minlength=k) / np.maximum(weight, 1.0))
 
-        kinematic = _clipped(residual[drive.channels.index("kinematic")], good)
-        force = None
-        if "force_balance" in drive.channels:
-            force = mean(_clipped(residual[drive.channels.index("force_balance")], good))
+        by_name = {c: mean(_clipped(x, good)) for c, x in zip(drive.channels, residual, strict=True)}
         motion = np.array([mean(x) for x in _motion(drive)]).T
-        return _Bins(mean(kinematic), force, weight, weight > 0.0, motion)
+        return _Bins(by_name["kinematic"], by_name.get("force_balance"), weight, weight > 0.0, motion)
 
     def cleaned(self, x: FloatArray) -> FloatArray:
         """A channel without the part that follows the motion, by least squares."""
@@ -212,11 +200,9 @@ class _Bins:
 
 def _motion(drive: Drive) -> list[FloatArray]:
     """Offset, speed, acceleration, jerk, their growth over time: shapes of sensors' and the car's errors. (n,) each"""
-    step = block_step(drive.dt)
-    v = drive.coordinates["v_x"]
-    a = np.gradient(v, step)
-    jerk = np.gradient(a, step)
-    t = drive.coordinates["t"] / max(drive.duration_s, 1.0)
+    v, t = drive.coordinates["v_x"], drive.coordinates["t"] / max(drive.duration_s, 1.0)
+    a = np.gradient(v, block_step(drive.dt))
+    jerk = np.gradient(a, block_step(drive.dt))
     return [np.ones_like(v), v / 20.0, t, a, jerk, t * a, t * jerk, v / 20.0 * a]
 
 
@@ -248,9 +234,8 @@ def _independent(a: FloatArray, b: FloatArray, at: BoolArray) -> float:
     pairs = np.fft.irfft(np.abs(np.fft.rfft(at.astype(np.float64), n)) ** 2, n)
     own = [np.fft.irfft(np.abs(np.fft.rfft(x, n)) ** 2, n) / np.maximum(pairs, 1.0) for x in (a, b)]
     reach = min(round(ALIKE_M / BIN_M), at.size - 1)
-    taper = np.linspace(1.0, 0.0, reach + 1)
-    rho = [x[: reach + 1] / max(x[0], 1e-30) for x in own]
-    both = rho[0] * rho[1] * taper
+    a, b = (x[: reach + 1] / max(x[0], 1e-30) for x in own)
+    both = a * b * np.linspace(1.0, 0.0, reach + 1)
     total = float(both[0] + 2.0 * both[1:].sum())
     return float(at.sum()) / max(total, 2.0 * OVER_M / BIN_M / 2.0)
 

@@ -101,8 +101,7 @@ class Hypothesis:
 
     def worth_naming(self, name: str) -> float:
         """Smallest deviation that is worth naming: the effect's own, or twice the usual error of a file."""
-        smallest = self.parameter(name).smallest
-        return max(smallest, WORTH * (self._own_tolerance or 0.0))
+        return max(self.parameter(name).smallest, WORTH * (self._own_tolerance or 0.0))
 
     @property
     def _own_tolerance(self) -> float | None:
@@ -110,11 +109,9 @@ class Hypothesis:
 
 
 def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis, ...], dict[str, str]]:
-    """All hypotheses that these logs can test, and the reason why others cannot be tested, by name.
-
-    An effect that the model already has at a place is tested like any other: as a change of its value. Of several
-    drives each may have what belongs to a drive by itself: a load, a wind, a slope.
-    """
+    """All hypotheses that these logs can test, and the reason why others cannot be tested, by name. An effect that the
+    model already has is tested as a change of its value. Of several drives each may have what belongs to a drive by
+    itself: a load, a wind, a slope."""
     present = frozenset.intersection(*(d.present for d in drives))
     wet = any(d.course.lanes for d in drives)
     torque = not any(d.untorqued for d in drives)
@@ -184,13 +181,7 @@ def _has_signal(where: str | None, present: frozenset[str], *, torque: bool) -> 
 
 
 def with_values(model: Model, found: Sequence[tuple[Hypothesis, Mapping[str, float]]]) -> Model:
-    """The model with hypotheses at values of their free parameters (absolute, not changes).
-
-    Raises
-    ------
-    ConfigError
-        If a value is outside its physical bounds.
-    """
+    """The model with hypotheses at absolute values of free parameters; ConfigError if one is beyond its bounds."""
     terms = list(model.terms)
     for h, values in found:
         own = {**h.fixed, **values}
@@ -222,11 +213,9 @@ def value_in(model: Model, h: Hypothesis, name: str) -> float:
 
 
 def residual(drive: Drive, model: Model, *, step: float = STEP_S, like: Led | None = None) -> FloatArray:
-    """Residual channels of a drive under a model, simulated in steps of `step` [s]. (C, m)
-
-    A model that changes the velocity's sensor changes the target speed, which is computed again. `like`: the drive
-    along the same course in these steps under another model, which need not be driven again for a sensor's effect.
-    """
+    """Residual channels of a drive under a model, simulated in steps of `step` [s]. (C, m) A model that changes the
+    velocity's sensor changes the target speed, too. `like`: the drive along the same course in these steps under
+    another model, which need not be driven again for a sensor's effect."""
     shown = simulated(drive, model, step=step, like=like)
     measured = channel_values(drive.columns, drive.channels, drive.vehicle, dt=drive.dt)
     return measured - channel_values(shown, drive.channels, drive.vehicle, dt=drive.dt)
@@ -246,20 +235,16 @@ def simulated(
 
 
 def signatures(
-    drive: Drive,
-    model: Model,
-    asked: Sequence[Hypothesis],
-    *,
-    base: FloatArray,
-    tick: Callable[[], None] = lambda: None,
-    each: bool = False,
-) -> list[FloatArray]:
-    """Change of the residual by one unit of each free parameter: (k, C, m) per hypothesis, around a model.
+    drive: Drive, model: Model, asked: Sequence[Hypothesis], *, base: FloatArray,
+    tick: Callable[[], None] = lambda: None, each: bool = False,
+) -> list[FloatArray]:  # fmt: skip
+    """Change of the residual by one unit of each free parameter: (k, C, m) per hypothesis, by differences of
+    simulations.
 
-    Computed from differences of simulations along the drive. To first order, a hypothesis of a whole axle or car is the
-    sum of its wheels; unless `each` is set, it is not simulated again. The tolerance of a lane is what its effect does
-    there. What another drive alone has changes nothing. On dry road longer steps than those of `base` do: a difference
-    of two simulations is exact to 1 % with them.
+    To first order, a hypothesis of a whole axle or car is the sum of its wheels; unless `each` is set, it is not
+    simulated again. The tolerance of a lane is what its effect does there. What another drive alone has changes
+    nothing. On dry road longer steps than those of `base` do: a difference of two simulations is exact to 1 % with
+    them.
     """
     # the force in a tie rod jumps with the torque
     model = model.of(drive.name)
@@ -278,10 +263,9 @@ def signatures(
             return residual(drive, changed, step=step_s, like=led if step_s == ROUGH_S else None)
 
         for name in h.free:
-            at, step = value_in(model, h, name), h.parameter(name).step
+            at, step = value_in(model, h, name), (p := h.parameter(name)).step
             if h.effect.drive.is_shift:
                 # noise of an input, shifted one way only, would correlate with itself in the residual
-                p = h.parameter(name)
                 low, high = max(at - step, p.low), min(at + step, p.high)
                 out.append((left(name, low) - left(name, high)) / (high - low))
                 continue

@@ -1,8 +1,5 @@
-"""Inputs of the simulation without their sensors' noise, and replacements for those that a log lacks.
-
-The inputs of the simulation are not compared with a measurement, but their noise would enter on both sides: in the
-residual and in the signature of an effect. A regression would then find effects in noise.
-"""
+"""Inputs of the simulation without their sensors' noise, which would enter on both sides, in the residual and in the
+signature of an effect, and replacements for those that a log lacks."""
 
 from __future__ import annotations
 
@@ -74,12 +71,10 @@ def lasting(bits: BoolArray, least_s: float, dt: float) -> BoolArray:
 
 
 def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
-    """A signal (n,) after Wiener's filter [wiener1949]: each frequency weighted by its share above the white noise.
-
-    The noise is estimated in a band well above the frequencies of drivers' actions. A signal sampled too slowly for
-    that stays unchanged. Zero phase: no delay. `dt`: step of the grid [s]; `rate_hz`: of the signal on the bus, if it
-    is slower than the grid, since linear interpolation between its samples has less noise at high frequencies.
-    """
+    """A signal (n,) after Wiener's filter [wiener1949]: each frequency weighted by its share above the white noise,
+    which is estimated well above the frequencies of drivers' actions. Zero phase: no delay. Unchanged if it is sampled
+    too slowly for that. `dt`: step of the grid [s]; `rate_hz`: of the signal on the bus, if slower: lines between
+    samples have less noise."""
     rate = min(rate_hz or 1.0 / dt, 1.0 / dt)
     low, high = (max(share * rate, least) for share, least in zip(TORQUE_BAND, LEAST_BAND_HZ, strict=True))
     if 0.5 * rate < high:
@@ -88,19 +83,14 @@ def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
 
 
 def quiet_speed(v: FloatArray, dt: float) -> FloatArray:
-    """A speed without its noise, by Wiener's filter and a mean over a second; it has no delay. (n,) to (n,) [m/s]
-
-    At constant speed the remaining noise would be the only motion. The simulated car would follow it, and a delay would
-    correlate with it.
-    """
+    """A speed without its noise, by Wiener's filter and a mean over a second; it has no delay. (n,) to (n,) [m/s] The
+    simulated car would follow the remaining noise."""
     return smooth(_filtered(v, dt, SPEED_BAND_HZ), dt, SPEED_S)
 
 
 def _filtered(x: FloatArray, dt: float, band_hz: tuple[float, float], lines: float = 0.0) -> FloatArray:
-    """The signal with each frequency weighted by its share above the noise of the band.
-
-    `lines`: time between samples that straight lines connect. [s]
-    """
+    """The signal with each frequency weighted by its share above the noise of the band; `lines`: time between samples
+    that straight lines connect. [s]"""
     n = x.size
     frequency = np.fft.rfftfreq(2 * n, dt)
     band = (frequency > band_hz[0]) & (frequency < band_hz[1])
@@ -129,13 +119,9 @@ def _ends(x: FloatArray, dt: float) -> tuple[float, float]:
 
 
 def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
-    """Wheel torques (4, n) [N·m] without noise; `rate_hz` as in `quiet`.
-
-    Left and right of an axle get its mean, unless they differ by more than sensors do. Light braking at an undriven
-    axle is torque like any other: 50 N·m now and then are 3 % of the torque in slow driving. Where an undriven
-    axle scatters by less than `NOT_TORQUE`, only events that stand out of its scatter are kept. The rest is noise of
-    unknown spectrum, and its mean replaces it.
-    """
+    """Wheel torques (4, n) [N·m] without noise; `rate_hz` as in `quiet`. Left and right of an axle get its mean, unless
+    they differ by more than sensors do. Light braking at an undriven axle is torque like any other. Where such an axle
+    scatters by less than `NOT_TORQUE`, events that stand out are kept, and the mean replaces the rest."""
     out = np.empty_like(torque)
     driven = 0 if float((torque[:2].sum(axis=0) ** 2).mean()) > float((torque[2:].sum(axis=0) ** 2).mean()) else 2
     total = float(np.sqrt((torque.sum(axis=0) ** 2).mean()))
@@ -151,15 +137,12 @@ def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) ->
 
 
 def confirmed_torque(torque: FloatArray, a: FloatArray, dt: float, per_torque: float) -> FloatArray:
-    """Wheel torques (4, n) [N·m] with each frequency weighted by the share that the car's acceleration confirms.
-
-    The noise of a real torque has a colour: within the frequencies of drivers, the torque alone does not show it. But
-    it does not accelerate the car. The cross spectrum of torque and acceleration, over the power of the torque, is the
-    share of torque in it, which is the weight of Wiener's filter [wiener1949].
+    """Wheel torques (4, n) [N·m] with each frequency weighted by the share that the car's acceleration confirms: the
+    cross spectrum of both over the power of the torque, which is the weight of Wiener's filter [wiener1949].
 
     `a` (n,): measured acceleration, finite, whose own noise does not matter [m/s²]; `per_torque`: acceleration per
     torque of the car of the file, compared at low frequencies only [m/s²/(N·m)]. Unchanged if the drive is too short or
-    steady to show it.
+    steady.
     """
     n, size = a.size, round(SEGMENT_S / dt)
     if n < 4 * size:
@@ -211,11 +194,8 @@ def roll_out(v: FloatArray, vehicle: Vehicle) -> FloatArray:
 
 
 def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
-    """Torque at the driven wheels that the car of the file needs for a speed on a flat road. (4, n) [N·m], >= 0
-
-    Zero where the car slows down faster than it rolls out: brakes are on all wheels, and one axle alone would lock at
-    that deceleration. At most for `A_MOST`.
-    """
+    """Torque at the driven wheels that the car of the file needs for a speed on a flat road, at most for `A_MOST`. (4,
+    n) [N·m], >= 0: brakes are on all wheels, and one axle alone would lock at their deceleration."""
     inertia = np.gradient(smooth(v, dt, SPEED_S), dt)
     force = vehicle.mass * np.maximum(np.minimum(inertia, A_MOST) + roll_out(v, vehicle), 0.0)
     rear = {"rwd": 1.0, "fwd": 0.0}.get(vehicle.drivetrain, vehicle.torque_split_rear)
@@ -225,11 +205,8 @@ def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
 def road_wheel_angle(
     columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, dt: float, *, most: float
 ) -> FloatArray:
-    """Angle of the front wheels, measured or computed from the gyro with the model. (n,) [rad], left positive
-
-    `most` [m/s²]: lateral acceleration beyond which the angle is cut; larger than in the samples used, because the
-    simulated car could spin.
-    """
+    """Angle of the front wheels, measured or computed from the gyro with the model. (n,) [rad], left positive `most`
+    [m/s²]: lateral acceleration beyond which it is cut, because the simulated car could spin."""
     understeer = understeer_gradient(Tyre().cornering_slope)
     if "steer_angle" in columns:
         angle = columns["steer_angle"]
@@ -243,11 +220,8 @@ def road_wheel_angle(
 
 
 def brakes_in_torque(pressure: FloatArray, torque: FloatArray, v: FloatArray, vehicle: Vehicle, dt: float) -> bool:
-    """Whether the torque (4, n) holds the brakes: beside it, the pressure explains little of the braking.
-
-    A fixed torque cannot decide: an engine drags with 300 N·m and more at the wheels, a motor that only helps the
-    brakes with 1500. The torque's gain and the mass may be wrong, so both shares are fitted.
-    """
+    """Whether the torque (4, n) holds the brakes: beside it, the pressure explains little of the braking. Both shares
+    are fitted: an engine drags with 300 N·m and more, a motor that only helps the brakes with 1500."""
     moving = v > V_MIN
     braked = (pressure > BRAKED) & moving
     if braked.sum() < 10:

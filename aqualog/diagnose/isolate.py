@@ -31,10 +31,7 @@ def p_correct(lam: float) -> float:
 
 def likelier_than_none(evidence: Evidence, blocks: Sequence[Block], shared: FloatArray) -> FloatArray:
     """Size of each column (K,) from which its effect is more likely than none, against its prior and its freedom.
-
-    `shared` (K + 1, K + 1): inner products with the tolerances, of noise that counts by its share. What a file may be
-    wrong by counts in full there: the limit of a value is a few of its standard deviations, not a few of the noise's.
-    """
+    `shared` (K + 1, K + 1): inner products with the tolerances, of noise that counts by its share."""
     out = np.zeros(evidence.count)
     for b in blocks:
         for c in evidence.columns[b.tag] if b.kind == "effect" else ():
@@ -50,10 +47,8 @@ def likelier_than_none(evidence: Evidence, blocks: Sequence[Block], shared: Floa
 def reference_sizes(
     evidence: Evidence, gram: FloatArray, threshold: float, least: FloatArray | None = None
 ) -> FloatArray:  # fmt: skip
-    """Size of each column (K,) that is detected with a power of 0.9, or the smallest worth naming if that is larger.
-
-    NaN where no physical size would be detected. `least` (K,): sizes that it must reach besides, in the same way.
-    """
+    """Size of each column (K,) that is detected with a power of 0.9, or the smallest worth naming if that is larger;
+    NaN where no physical size would be. `least` (K,): sizes that it must reach besides, in the same way."""
     out = np.full(evidence.count, np.nan)
     for columns in evidence.columns:
         for c in columns:
@@ -84,10 +79,8 @@ def limits(evidence: Evidence, sizes: FloatArray) -> tuple[Limit, ...]:
 
 
 def confusions(evidence: Evidence, gram: FloatArray, sizes: FloatArray) -> tuple[Confusion, ...]:
-    """All pairs, and for each effect the sets of two and three rivals that imitate it much better than any one.
-
-    Effects have their reference sizes; effects that the log cannot show are left out.
-    """
+    """All pairs, and for each effect the sets of two and three rivals that imitate it much better than any one, at
+    their reference sizes; without effects that the log cannot show."""
     G = gram[:-1, :-1]
     shared = {h.key for h in evidence.asked if not h.drive}
     seen = [
@@ -95,10 +88,7 @@ def confusions(evidence: Evidence, gram: FloatArray, sizes: FloatArray) -> tuple
         if math.isfinite(sizes[c[0]]) and len(c) == 1
         and not (evidence.asked[i].allowed or (evidence.asked[i].drive and evidence.asked[i].key in shared))
     ]  # fmt: skip
-    first: dict[str, int] = {}
-    for i in seen:
-        first.setdefault(evidence.asked[i].key, i)
-    index = list(first.values())
+    index = sorted({evidence.asked[i].key: i for i in reversed(seen)}.values())  # the first one of each
     c = np.array([evidence.columns[i][0] for i in index], dtype=np.intp)
     inner = G[np.ix_(c, c)]
     energy = np.diag(inner)
@@ -141,11 +131,9 @@ def _confusion(
     c = evidence.columns[i][0]
     r = [evidence.columns[j][0] for j in rivals]
     size = float(evidence.smallest[c])
-    alike = np.linalg.lstsq(G[np.ix_(r, r)], G[r, c], rcond=1e-9)[0] * size
-    sizes = (size, *(float(a) for a in alike))
-    parts = []
-    for h, x in zip((evidence.asked[j] for j in (i, *rivals)), sizes, strict=True):
-        unit = h.parameter(h.free[0]).unit
-        parts.append(f"{name_of(h.effect.name, h.where)} of {quantity(x, unit, change=True)}")
+    sizes = (size, *(np.linalg.lstsq(G[np.ix_(r, r)], G[r, c], rcond=1e-9)[0] * size).tolist())
+    each = zip((evidence.asked[j] for j in (i, *rivals)), sizes, strict=True)
+    said = [(h, quantity(x, h.parameter(h.free[0]).unit, change=True)) for h, x in each]
+    parts = [f"{name_of(h.effect.name, h.where)} of {x}" for h, x in said]
     relation = f"On this log {parts[0]} looks exactly like {listed(parts[1:])}."
     return Confusion(key, others, lam, p_correct(lam), relation, sizes)

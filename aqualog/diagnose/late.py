@@ -1,11 +1,9 @@
-"""Signals that come so late that the competition did not find it, by the lags of the whole drive.
-
-Lags between velocity, wheels, accelerometer and torque are known to hundredths of a second from curves and braking,
-too, which the force balance leaves out. A competition on tangents may look for them in other effects.
-"""
+"""Signals that come so late that the competition did not find it, by the lags of the whole drive: curves and braking,
+which the force balance leaves out, show them to hundredths of a second."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -47,8 +45,9 @@ class Late:
 
     def beyond(self, causes: Sequence[Cause]) -> Late:
         """Delays that are not among the causes of a diagnosis, with about this value."""
-        found = {c.key: e for c in causes for n, e in c.parameters.items() if n == "delay"}
-        return Late(tuple(c for c in self.causes if not _agrees(c.parameters["delay"], found.get(c.key))))
+        found = {c.key: c.parameters["delay"].value for c in causes if "delay" in c.parameters}
+        own = ((c, c.parameters["delay"]) for c in self.causes)
+        return Late(tuple(c for c, lag in own if not lag.low <= found.get(c.key, math.nan) <= lag.high))
 
     def without(self, model: Model) -> Model:
         """A model without them."""
@@ -85,7 +84,3 @@ def _places(doubt: Doubt) -> set[str]:
 def _cause(where: str, delay: float) -> Cause:
     own = {"delay": Estimate(delay, delay - HALF_S, delay + HALF_S, "s")}
     return Cause(DELAY.name, where, own, ("kinematic",), cause_sentence(DELAY, where, own), MOST)
-
-
-def _agrees(lag: Estimate, found: Estimate | None) -> bool:
-    return found is not None and lag.low <= found.value <= lag.high

@@ -1,9 +1,6 @@
-"""Catalogue of safe runs, checks and sensors that may distinguish causes, as data.
-
-Runs stay within 3.5 m/s² and 130 km/h on a dry road, 90 km/h on a wet one, and last a minute. They are driven on the
-road of the log and soon after it, so that slope and wind are the same. Slopes are not among them: a hill of unknown
-height would be one more effect.
-"""
+"""Catalogue of safe runs, checks and sensors that may distinguish causes, as data. Runs stay within 3.5 m/s² and 130
+km/h on a dry road, 90 km/h on a wet one, and last a minute. They are driven on the road of the log and soon after it,
+so that slope and wind are the same."""
 
 from __future__ import annotations
 
@@ -29,11 +26,9 @@ WET_STEP, WET_LEAST, WET_MOST = 20.0 * KMH, 30.0 * KMH, 90.0 * KMH  # [m/s]
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """A run of one minute. `speed` (t [s], v [km/h]) that the driver keeps to; `minutes` with the way there and back.
-
-    `how`: an order. `rolls` from this time on without drive or brakes [s]. `water`: how it differs from the
-    log's speed on water: -1 slower, 1 faster, 0 dry at that speed; None: dry, with the given `speed`.
-    """
+    """A run of one minute. `how`: an order; `speed` (t [s], v [km/h]) that the driver keeps to; `minutes` with the way
+    there and back; `rolls`: from this time on without drive or brakes [s]; `water`: how it differs from the log's speed
+    on water: -1 slower, 1 faster, 0 dry at that speed; None: dry, with the given `speed`."""
 
     name: str
     how: str

@@ -53,12 +53,10 @@ def next_manoeuvre(
     evidence: Evidence, rivals: Sequence[Rival], noises: Sequence[Noise], model: Model
 ) -> Manoeuvre | None:
     """The run, check or sensor that distinguishes sets that the log cannot; None if no two differ in their effects.
-
     `rivals`: refitted sets on `model`, best first; `noises`: of each drive, after the best set. The `name` is that of
     the run or check with the most information per minute of those that reach a probability of 0.95, else with the most
     information. It is `sensor` if only a further signal would give a tenth of the missing information, and `none` if
-    nothing does. `separates` has the pairs that it decides in 95 of 100 cases. The same for the same input.
-    """
+    nothing does. `separates` has the pairs that it decides in 95 of 100 cases."""
     names = [frozenset(h.key for h in c.refit.members) for c in rivals]
     if len(set(names)) < 2:
         return None

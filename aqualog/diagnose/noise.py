@@ -1,10 +1,6 @@
-"""Coloured noise of residual channels: an autoregression with a long memory, and whitening.
-
-Sensors drift, wind gusts, roads are rough: residuals are correlated over time. A test that treats their samples as
-independent finds an effect in every log. The channels are combined so that they share little noise, each combination
-follows an autoregression on its last samples and on means over ever longer stretches of its past (up to 13 s), and the
-remainders are made uncorrelated across the combinations.
-"""
+"""Coloured noise of residual channels: an autoregression with a long memory, and whitening. The channels are combined
+so that they share little noise, each combination follows an autoregression on its last samples and on means over ever
+longer stretches of its past (up to 13 s), and the remainders are made uncorrelated across the combinations."""
 
 from __future__ import annotations
 
@@ -79,11 +75,8 @@ def good_size(n: int) -> int:
 
 def fit_noise(residual: FloatArray, mask: BoolArray, contrasts: FloatArray) -> Noise:
     """Noise of a residual (C, n), known effects subtracted, on its usable samples `mask` (n,): some hundreds at least.
-
     `contrasts` (C, C): combinations of channels that share little noise, as rows. The order is chosen per contrast by
-    Akaike's criterion [akaike1974]. Innovations beyond 3 standard deviations weigh less (Huber [huber1981]), so that
-    outliers and kerbs do not dominate.
-    """
+    Akaike's criterion [akaike1974]. Innovations beyond 3 standard deviations weigh less (Huber [huber1981])."""
     x = bridged(residual, mask)
     used = _settled(mask)
     C, n = x.shape
@@ -179,10 +172,8 @@ def _autoregression(z: FloatArray, weights: FloatArray, white: float) -> FloatAr
 
 def whitened(x: FloatArray, noise: Noise, used: BoolArray | None = None) -> FloatArray:
     """Arrays (k, C, n), bridged, as independent unit innovations, flat: (k, C n), or of the m `used` samples: (k, C m).
-
-    Their first second replaces the unknown past. Inner products of whitened arrays are in units of twice the
-    log-likelihood; masked samples are zero.
-    """
+    Their first second replaces the unknown past. Inner products are in units of twice the log-likelihood; masked
+    samples are zero."""
     kept = np.arange(x.shape[-1]) if used is None else np.flatnonzero(used)
     out = np.empty((*x.shape[:-1], kept.size))
     shares = np.diff(np.pad(-noise.taps[:, [a for a, _ in _BLOCKS]], [(0, 0), (1, 1)]))
@@ -194,9 +185,7 @@ def whitened(x: FloatArray, noise: Noise, used: BoolArray | None = None) -> Floa
 @compiled
 def _whiten(x, rotation, shares, weights, shaping, kept, out):  # type: ignore[no-untyped-def]
     """Fill the innovations of arrays: what each combination is beyond its last samples and means over blocks of them.
-
-    Means over blocks are differences of running totals: `shares` (C, 12) are those of the totals up to each edge.
-    """
+    These are differences of running totals: `shares` (C, 12) are those of the totals up to each edge."""
     _, C, n = x.shape
     m = kept.size
     e = np.empty((C, n))

@@ -1,9 +1,6 @@
-"""The water of a drive at the sizes that its effects most likely have, before anything competes.
-
-Near floating, slip is proportional to one over the square of the remaining contact. A signature at the file's water is
-then a tangent beside a pole: its weight is on the few samples closest to floating, where it predicts what no simulation
-does. So the effects of water are simulated at several sizes each, and signatures are drawn around the most likely one.
-"""
+"""The water of a drive at the sizes that its effects most likely have, before anything competes. Near floating, slip is
+proportional to one over the square of the remaining contact: a signature at the file's water is a tangent beside a
+pole. So the effects of water are simulated at several sizes, and signatures are drawn around the most likely one."""
 
 from __future__ import annotations
 
@@ -45,11 +42,8 @@ class _Tried(NamedTuple):
 
 def around_water(evidence: Evidence, model: Model) -> tuple[Evidence, Term | None]:
     """The evidence with signatures of water around its most likely single effect, and that; the same evidence and none
-    on dry drives.
-
-    What is most likely is decided with the noise estimated anew under each, since an effect that is left in the
-    residual looks like noise. Residuals are those that a linear model around this point would have had at the start.
-    """
+    on dry drives. The noise is estimated anew under each, since an effect that is left in the residual looks like
+    noise. Residuals are those that a linear model around this point would have had at the start."""
     every = of_water(evidence)
     if not every:
         return evidence, None
@@ -91,10 +85,8 @@ def around_water(evidence: Evidence, model: Model) -> tuple[Evidence, Term | Non
 
 
 def _moved(evidence: Evidence, model: Model, h: Hypothesis, off: float) -> Model:
-    """The model with the first parameter of an effect changed, axle by axle where it is asked at axles.
-
-    A gain of the whole car would multiply those of its axles, and what they may differ by with them.
-    """
+    """The model with the first parameter of an effect changed, axle by axle where it is asked at axles: a gain of the
+    whole car would multiply theirs."""
     axles = [o for o in evidence.asked if h.where is None and o.effect is h.effect and o.where in AXLES]
     values = {n: value_in(model, h, n) for n in h.free}
     values[h.free[0]] += off

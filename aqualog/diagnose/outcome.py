@@ -32,14 +32,10 @@ EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect expl
 
 
 def conclude(found: Found, model: Model) -> Outcome[Option]:
-    """The verdict on what a search found.
-
-    An unknown form comes before any name; beside it stand the effects of the same set whose probability is 0.95 or
-    more, and whose values are not at a physical bound. They hang on a function that is not exactly known, so they are
-    not certain. A name needs that probability too, and must pass the checks of `shown.repeats`. Else the answer is what
-    the posterior consists of, up to 0.95. Sets whose causes worth naming are the same count together. An only answer
-    that is not named and leaves the channels larger than it finds them is noise.
-    """
+    """The verdict on what a search found. An unknown form comes before any name; beside it stand the effects of the
+    same set whose probability is 0.95 or more, and whose values are not at a physical bound, but they are not certain.
+    A name needs that probability too, and must pass the checks of `shown.repeats`. An only answer that is not named and
+    leaves the channels larger than it finds them is noise."""
     if found.forms:
         linear = _linear(found, found.posterior.best, model)
         share = {n: tempered(p) for n, p in found.posterior.marginal.items()}
@@ -155,10 +151,8 @@ def _linear(found: Found, members: Members, model: Model) -> Causes:
 def _cause(
     h: Hypothesis, values: FloatArray, off: FloatArray, sd: FloatArray, explains: tuple[str, ...]
 ) -> tuple[Cause, bool]:
-    """A cause, and whether a value reaches its smallest size and its interval excludes zero effect.
-
-    An interval also covers that the car's response to the effect is a few per cent off the simulator's, or a tyre's.
-    """
+    """A cause, and whether a value reaches its smallest size and its interval excludes zero effect; the interval also
+    covers that the car's response is a few per cent off the simulator's, or a tyre's."""
     sd = np.hypot(sd, math.hypot(DOUBT, h.effect.drive.doubt) * off)
     parameters, large = {}, False
     for name, x, change, s in zip(h.free, values.tolist(), off.tolist(), sd.tolist(), strict=True):

@@ -103,11 +103,8 @@ class Alternative:
 
 @dataclass(frozen=True, slots=True)
 class Significance:
-    """Family-wise test for any effect: largest test value, its p-value, and the level that the calibration reached.
-
-    `level` is the requested level, `achieved` the share of surrogates without effect beyond the threshold that was
-    used.
-    """
+    """Family-wise test for any effect: largest test value, its p-value, the requested `level`, and the `achieved` one,
+    the share of surrogates without effect beyond the threshold that was used."""
 
     statistic: float
     threshold: float
@@ -119,10 +116,8 @@ class Significance:
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """Smallest size of an effect that this log shows with a power of 0.9, in the unit of its first parameter.
-
-    NaN where the log does not show it at any physical size. `smallest` is the smallest size worth naming.
-    """
+    """Smallest size of an effect that this log shows with a power of 0.9, in the unit of its first parameter; NaN where
+    it shows no physical size. `smallest` is the smallest size worth naming."""
 
     effect: str
     where: str | None
@@ -133,12 +128,10 @@ class Limit:
 
 @dataclass(frozen=True, slots=True)
 class Confusion:
-    """Two sets of effects and how well this log can distinguish them, before any residual is used.
-
-    `separation` lambda: whitened energy of `effect` at its reference size that the `rivals` (1 to 3) cannot imitate;
-    `p_correct` = Phi(sqrt(lambda) / 2). `relation`: sentence, where there is an exact relation, and the `sizes` in it:
-    of the effect, then of the rivals.
-    """
+    """Two sets of effects and how well this log can distinguish them, before any residual is used. `separation` lambda:
+    whitened energy of `effect` at its reference size that the `rivals` (1 to 3) cannot imitate; `p_correct` =
+    Phi(sqrt(lambda) / 2). `relation`: sentence, where it is exact, and the `sizes` in it: of the effect, then of the
+    rivals."""
 
     effect: str
     rivals: tuple[str, ...]
@@ -179,11 +172,9 @@ class Remainder:
 
 @dataclass(frozen=True, slots=True)
 class Manoeuvre:
-    """A run that would distinguish the remaining causes, or the answer that no run of the catalogue does.
-
-    `name`: of the catalogue, `none`, or `sensor`; `separation_now`, `separation_then`: lambda of the worst pair,
-    NaN where `before` and `after` have the probability of naming the right cause.
-    """
+    """A run that would distinguish the remaining causes, or the answer that no run of the catalogue does. `name`: of
+    the catalogue, `none`, or `sensor`; `separation_now`, `separation_then`: lambda of the worst pair, NaN where
+    `before` and `after` have the probability of naming the right cause."""
 
     name: str
     separates: tuple[tuple[str, str], ...]
@@ -225,11 +216,9 @@ class Consequence:
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """Gain of the extended model. `log_score` on held-out drives with its 95 % interval, in nats (natural logarithm).
-
-    `heldout` names them; empty: the gain is on the diagnosed drives themselves (`in_sample`). `promised`: what the
-    effects would gain there on average if they and their values were right, NaN where it was not computed. [nats]
-    """
+    """Gain of the extended model. `log_score` on the drives `heldout` with its 95 % interval; without these on the
+    diagnosed ones (`in_sample`). `promised`: what the effects would gain there on average if they and their values were
+    right, NaN where it was not computed. [nats (natural logarithm)]"""
 
     channels: tuple[ChannelGain, ...]
     log_score: float
@@ -244,10 +233,8 @@ class Gain:
 
 @dataclass(frozen=True, slots=True)
 class ResidualView:
-    """A residual channel for the page: arrays (n,) at `dt`; NaN where masked.
-
-    `coordinates`: `t` [s], `v_x` [m/s], `torque` [N·m], `position` [m], `a_x` [m/s²] ... (n,) each; `before` and
-    `after` the residual with the vehicle file alone and with the extended model.
+    """A residual channel for the page, with the vehicle file alone and with the extended model: arrays (n,) at `dt`;
+    NaN where masked. `coordinates`: `t` [s], `v_x` [m/s], `torque` [N·m], `position` [m], `a_x` [m/s²] ... (n,) each.
     """
 
     drive: str

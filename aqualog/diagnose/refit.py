@@ -30,12 +30,9 @@ SMALLEST = 1.0  # change, in steps of its parameter, from which a signature is s
 
 @dataclass(frozen=True, slots=True)
 class Refit:
-    """A set at its best values.
-
-    `values` (k,) absolute, `off` (k,) from those of the model that it came on, `covariance` (k, k) without inflation,
-    `loss` the sum of squares in the metric of noise and tolerances; `residuals` (C, n) and `signatures` (k, C, n) per
-    drive at these values; `bounded` (k,): whether a value sits at its physical bound.
-    """
+    """A set at its best values: `values` (k,) absolute, `off` (k,) from those of the model that it came on,
+    `covariance` (k, k) without inflation, `loss` the sum of squares in the metric of noise and tolerances; `residuals`
+    (C, n) and `signatures` (k, C, n) per drive there; `bounded` (k,): whether a value sits at its physical bound."""
 
     members: tuple[Hypothesis, ...]
     values: FloatArray
@@ -60,11 +57,9 @@ class Refit:
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """Inner products under noise and tolerances: u' (I - A' M A) w for whitened rows; `A` (k, N), `M` (k, k).
-
-    `apart` (K,): standard deviations that are not in the metric and are added to those of the values found; `coarse`:
-    share of the log-likelihood that counts.
-    """
+    """Inner products under noise and tolerances: u' (I - A' M A) w for whitened rows; `A` (k, N), `M` (k, k); `apart`
+    (K,): standard deviations that are added to those of the values found instead; `coarse`: share of the log-likelihood
+    that counts."""
 
     parts: tuple[Part, ...]
     weighings: tuple[Weighing, ...]
@@ -101,14 +96,11 @@ def metric(
 ) -> Metric:  # fmt: skip
     """Inner products under noise and a share of the tolerances, as in `Arena.tolerant`.
 
-    Sets are compared with the full tolerances. Values are estimated with the share `KNOWN`: vehicle files usually err
-    by less than the tolerances, and a fit that tolerates its own effect would look for it where it hardly shows. Lanes
-    differ however well a file is known: theirs always count in full. So do the car's drive-to-drive spread and the
-    errors of the file's own values, because this drive deviates by them too.
-
-    The columns `beside`, whose values are estimated, are an exception, and so is every effect that looks the same.
-    Their spread is not part of the metric; it is added to the variance of the estimated values (`Metric.apart`). Both
-    ways agree as long as a signature does not change with its value (D). Only the second stays right if it does.
+    Sets are compared with the full tolerances. Values are estimated with the share `KNOWN`: a fit that tolerates its
+    own effect would look for it where it hardly shows. Tolerances of lanes always count in full, and so do the car's
+    drive-to-drive spread and the errors of the file's own values. The columns `beside`, whose values are estimated, are
+    an exception, and so is every effect that looks the same: their spread is added to the variance of the values
+    (`Metric.apart`).
     """
     evidence = arena.evidence
     apart = np.zeros(evidence.count)
@@ -122,9 +114,8 @@ def metric(
     shares = np.array([share if owner[c].lane is None else 1.0 for c in range(evidence.count)])
     sd = np.maximum(shares * evidence.tolerance, known)
     k = np.flatnonzero(sd > 0.0)
-    pieces = []
-    for p, w in zip(arena.parts, weighings, strict=True):
-        pieces.append(w.rows(p.signatures[k] * sd[k, None, None], np.float32))
+    each = zip(arena.parts, weighings, strict=True)
+    pieces = [w.rows(p.signatures[k] * sd[k, None, None], np.float32) for p, w in each]
     A = np.concatenate(pieces, axis=1) if len(pieces) > 1 else pieces[0]
     A *= np.float32(math.sqrt(coarse))
     M = np.asarray(np.linalg.inv(np.eye(len(A)) + products(A)))
@@ -133,12 +124,9 @@ def metric(
 
 def likeliest(evidence: Evidence, measure: Metric, residuals: Sequence[FloatArray], model: Model) -> Model:
     """The model with what the car and its tyres differ by from their file, most likely beside these residuals (C, n).
-
-    All tolerances deviate together, theta = (S^-2 + A'A)^-1 A'y, each up to `FARTHEST`. Those of a drive or a lane are
-    left out of the model: another drive has other ones. Less friction stands for a curve that bends early, but would
-    let the wheels spin, and is left out, too. A term that the model has keeps its values. `measure`: with all
-    tolerances in full.
-    """
+    All tolerances deviate together, theta = (S^-2 + A'A)^-1 A'y, each up to `FARTHEST`; those of a drive or a lane, and
+    less friction, with which wheels would spin, are left out. A term that the model has keeps its values. `measure`:
+    with all tolerances in full."""
     k = np.flatnonzero(evidence.forgiven > 0.0)
     theta = np.zeros(evidence.count)
     owner = {c: h for h, columns in zip(evidence.asked, evidence.columns, strict=True) for c in columns}
@@ -155,11 +143,9 @@ def likeliest(evidence: Evidence, measure: Metric, residuals: Sequence[FloatArra
 
 
 def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure: Metric, model: Model) -> Refit | None:
-    """Gauss-Newton in the simulator from the linear values on; None if it has no solution within the bounds.
-
-    `chosen`: hypotheses of the set; `start` (k,): changes of their values with which the search starts; `measure`: held
-    fixed, so that sets can be compared; `model`: on which the set comes.
-    """
+    """Gauss-Newton in the simulator from the linear values on; None if it has no solution within the bounds. `chosen`:
+    hypotheses of the set; `start` (k,): changes of their values with which the search starts; `measure`: held fixed, so
+    that sets can be compared; `model`: on which the set comes."""
 
     def tried_at(values: FloatArray) -> tuple[FloatArray, list[FloatArray], Model] | None:
         try:
@@ -231,9 +217,7 @@ def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure:
 
 def secants(evidence: Evidence, found: Refit, model: Model) -> tuple[FloatArray, ...]:
     """Signatures (k, C, n) per drive from each value's start to where it was found, the others where they were found.
-
-    Where a signal is shifted, its noise would correlate with itself; there, and where nothing changed, the slope stays.
-    """
+    The slope stays where nothing changed, and where a signal is shifted: its noise would correlate with itself."""
     out = [s.copy() for s in found.signatures]
     for k, ((h, _), off) in enumerate(zip(found.names, found.off.tolist(), strict=True)):
         if h.effect.drive.is_shift or abs(off) < SMALLEST * h.parameter(found.names[k][1]).step:

@@ -62,10 +62,8 @@ SAME = 0.2  # of what a signal changes by from sample to sample, a difference th
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """`level` of false alarms for any effect, `surrogates` for its calibration, 0: none; `seed` of all draws.
-
-    `views`: with the residuals for a page; `consequences`: with the model's effect on the detectors.
-    """
+    """`level` of false alarms for any effect, `surrogates` for its calibration, 0: none; `seed` of all draws; `views`:
+    with the residuals for a page; `consequences`: with the model's effect on the detectors."""
 
     seed: int = 1
     level: float = 0.01
@@ -87,14 +85,7 @@ def diagnose(
 
     The drives were measured with the same car in the same state; each has a noise of its own. `model`: terms that are
     known already; `holdout`: drives that are used only for the gain. `progress` gets the name of each step and the
-    share that is done.
-
-    Raises
-    ------
-    SignalError
-        If no drive can be used.
-    ConfigError
-        If two drives have the same name.
+    share that is done. SignalError if no drive can be used, ConfigError if two drives have the same name.
     """
     options, tell, given = options or Options(), progress or (lambda _text, _share: None), model or Model()
     late = found_late([s for _, s in drives], vehicle, with_known(given, vehicle))
@@ -236,9 +227,9 @@ def _with_slow_force(found: Found, outcome: Outcome[Option], model: Model) -> tu
     if outcome.verdict != "no_effect" or len(evidence.drives) > 1:
         return found, outcome
     force = slow_force(evidence.drives[0], evidence.residuals[0], model)
-    return (
-        (found, outcome) if force is None else (replace(found, forms=(force,)), outcome._replace(verdict="unexplained"))
-    )
+    if force is None:
+        return found, outcome
+    return replace(found, forms=(force,)), outcome._replace(verdict="unexplained")
 
 
 def _gained(
@@ -285,11 +276,8 @@ def _at_likeliest(
 
 
 def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str]) -> Outcome[Option]:
-    """The outcome, without a name where the drives gain too little of what it promises them.
-
-    Of held-out drives it must be a name of car or tyre: a load, a wind or a road may be the diagnosed drive's alone.
-    `rings` are certain without other drives.
-    """
+    """The outcome, without a name where the drives gain too little of what it promises them; of held-out drives only a
+    name of car or tyre: others may be the diagnosed drive's alone. `rings` are certain without other drives."""
     if gained is None or gained.log_score > KEPT * gained.promised:
         return outcome
     belong = {EFFECTS[c.effect].belongs for c in outcome.causes if not c.drives}
@@ -382,11 +370,8 @@ def _is_same(a: Drive, b: Drive) -> bool:
 
 
 def accelerometer_defect(drive: Drive) -> Follow | None:
-    """Whether `a_x` is the car's longitudinal acceleration: its changes over 2 s against those of dv/dt.
-
-    Braked stretches count, too, in which the torque says nothing: the car moves most there. None if it is, or if the
-    speed changes too little for a judgement.
-    """
+    """How `a_x` is not the car's longitudinal acceleration, by its changes over 2 s against those of dv/dt, braking
+    included; None if it is, or if the speed changes too little for a judgement."""
     if "a_x" not in drive.columns:
         return None
     # not the course's target: it leads the simulation of a car that is heavier than its file by more than the speed
@@ -396,14 +381,6 @@ def accelerometer_defect(drive: Drive) -> Follow | None:
         return None
     wrong = found.correlation < LEAST_CORRELATION or not LEAST_GAIN <= found.gain <= MOST_GAIN
     return found if wrong else None
-
-
-def _forgets(drive: Drive) -> float | None:
-    """Time constant [s] of the high pass that `a_x` has been through, if it has."""
-    if "a_x" not in drive.columns:
-        return None
-    a, v = drive.columns["a_x"], drive.speed
-    return passed_from(a, v, np.isfinite(a) & np.isfinite(v), drive.dt)
 
 
 def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> str:
@@ -417,7 +394,9 @@ def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> 
                 f"a_x (channel {channel}) is not the acceleration of the car in {d.name}: the correlation of its "
                 f"changes with those of the speed is {defect.correlation:.2f}, and their ratio is {defect.gain:.2f}"
             )
-        if (corner := _forgets(d)) is not None:
+        a, v = d.columns.get("a_x", np.empty(0)), d.speed
+        # the time constant of the high pass that it has been through
+        if a.size and (corner := passed_from(a, v, np.isfinite(a) & np.isfinite(v), d.dt)) is not None:
             return (
                 f"a_x of {d.name} forgets what lasts: it is the car's acceleration behind a high pass of about "
                 f"{corner:.0f} s, as of a sensor that is coupled without its constant part"

@@ -104,13 +104,11 @@ def of_log(case: Case) -> FloatArray:
 def forecast(case: Case, log: FloatArray, run: FloatArray, times: int, group: FloatArray) -> Forecast:
     """Expected information of a run that is driven so many times.
 
-    Under set i, the parameters and tolerances have a normal posterior after the log, and so have the data of the run.
-    Tolerances of the car and its tyres are those of the log; those of a drive, as the wind, the run has for itself. The
-    data are drawn under each set in the space that all rows span, and each set's density gives the posterior. Of log
-    and run a share of the likelihood counts, as in the verdict.
-
-    `log`, `run` (N, N): inner products of the rows of `of_log`, and of `of_run` or `of_check`; `group` (S, S): 1 where
-    a set (row) has the effects of a group (column), since such sets are one cause.
+    Under set i, the parameters and tolerances have a normal posterior after the log, and so have the data of the run;
+    tolerances of a drive, as the wind, the run has for itself. The data are drawn under each set in the space that all
+    rows span, and each set's density gives the posterior, as coarse as in the verdict. `log`, `run` (N, N): inner
+    products of the rows of `of_log`, and of `of_run` or `of_check`; `group` (S, S): 1 where a set (row) has the effects
+    of a group (column), since such sets are one cause.
     """
     size, turn = np.linalg.eigh(run * times)
     seen = size > 1e-9 * max(float(size[-1]), 1e-9)
@@ -218,10 +216,7 @@ def _weighed(case: Case, drive: Drive, rows: FloatArray) -> FloatArray:
 
 
 def of_check(case: Case, check: Check) -> FloatArray:
-    """Inner products of one reading: the remainder after each set, and the change by its parameters.
-
-    A reading at several wheels is their mean, so one wheel counts a quarter.
-    """
+    """Inner products of one reading: the remainder after each set, and the change by its parameters."""
 
     def share(h: Hypothesis, name: str) -> float:
         if h.effect.drive.check is not check or h.where not in check.where or name != check.parameter:

@@ -1,9 +1,6 @@
 """Places where the clock of one signal jumps against the others: a logger's seam, samples lost without a gap in time.
-
-Accelerometer, wheels, reference velocity and torque all show the car's acceleration. Over some seconds the delay of one
-against another is measured; a step of it that stays is a seam. A gear shift is over within its window, and a clock that
-drifts makes a ramp.
-"""
+Over some seconds the delay of one source of the car's acceleration against another is measured; a step of it that stays
+is a seam. A gear shift is over within its window, and a clock that drifts makes a ramp."""
 
 from __future__ import annotations
 
@@ -40,11 +37,8 @@ NEAR_S = 5.0 * WINDOW_S  # [s] within which steps of several pairs are one seam
 @dataclass(frozen=True, slots=True)
 class Seam:
     """A jump of a signal's clock at `t` [s], known to a window: from there on it comes `size` [s] later; earlier if
-    negative.
-
-    `signals`: the one that jumps; two where no third one shows which. `p_value`: of such a step by chance anywhere in
-    the drive.
-    """
+    negative. `signals`: the one that jumps; two where no third one shows which. `p_value`: of such a step by chance
+    anywhere in the drive."""
 
     t: float
     size: float
@@ -69,12 +63,9 @@ class _Delays(NamedTuple):
 
 
 def seams(signals: Signals, vehicle: Vehicle, *, seed: int = 1) -> tuple[Seam, ...]:
-    """Jumps of the clock of accelerometer, wheels, reference velocity or torque, first ones first.
-
-    `signals` at the log's own rate; of the vehicle the radii only, a wrong gain does not matter; `seed` of the
-    permutations of windows that calibrate the test. Limits: two jumps of one signal within half a minute are one;
-    without acceleration there is nothing to see.
-    """
+    """Jumps of the clock of accelerometer, wheels, reference velocity or torque, first ones first. `signals` at the
+    log's own rate; of the vehicle the radii only; `seed` of the permutations of windows that calibrate the test.
+    Limits: two jumps of one signal within half a minute are one; without acceleration there is nothing to see."""
     sources = _sources(signals, vehicle)
     pairs = list(combinations(sources, 2))
     steps: list[Seam] = []
@@ -199,10 +190,8 @@ def _steps(pair: tuple[str, str], d: _Delays, tests: int, rng: np.random.Generat
 
 
 def _scan(d: _Delays, delays: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """F-type gain of a step beside what is no step, for series (s, m) and all places: gains and sizes (s, places).
-
-    No step are a level and a ramp (a clock that drifts).
-    """
+    """F-type gain of a step beside what is no step, a level and a ramp (a clock that drifts), for series (s, m) and all
+    places: gains and sizes (s, places)."""
     t, w = d.t, np.sqrt(d.weight)
     base, _ = np.linalg.qr(np.stack([w, w * (t - t.mean()) / max(float(np.ptp(t)), 1e-9)], axis=1))
     y = delays * w

@@ -1,9 +1,6 @@
-"""From residuals to sets of effects with probabilities: a competition on linear signatures, and its best sets refitted.
-
-The competition visits thousands of sets on inner products. Signatures are straight lines, effects are not: so the
-competition is repeated around its own best set, and the sets that hold most of the posterior are refitted in the
-simulator, which gives their evidence anew.
-"""
+"""From residuals to sets of effects with probabilities: a competition on linear signatures visits thousands of sets,
+and is repeated around its own best set. The sets that hold most of the posterior are refitted in the simulator, which
+gives their evidence anew."""
 
 from __future__ import annotations
 
@@ -11,6 +8,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import count
 
 import numpy as np
 
@@ -55,11 +53,9 @@ Tell = Callable[[str, float], None]
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """A set of blocks of the arena and its log evidence; `refit` None where only the linear one was computed.
-
-    `beyond`: blocks beside it that would stand at a physical bound, which its evidence needs; `relief`: what it gains
-    if the simulator may as well have the response exactly.
-    """
+    """A set of blocks of the arena and its log evidence; `refit` None where only the linear one was computed; `beyond`:
+    blocks beside it that would stand at a physical bound, which its evidence needs; `relief`: what it gains if the
+    simulator may as well have the response exactly."""
 
     members: Members
     evidence: float
@@ -71,11 +67,8 @@ class Option:
 @dataclass(frozen=True, slots=True)
 class Found:
     """Inner products (K + 1, K + 1), `plain` and in `gram` with tolerances, and `calibration` describe what the log can
-    distinguish.
-
-    `forms`: unknown forms; if there are any, `arena` and `posterior` are those of all that competes and there are no
-    `options`. Else they are those of known effects, and `options` the sets with what they gain.
-    """
+    distinguish. With unknown `forms`, `arena` and `posterior` are those of all that competes and there are no
+    `options`. Else they are those of known effects, and `options` the sets with what they gain."""
 
     significance: Significance
     plain: FloatArray
@@ -89,17 +82,15 @@ class Found:
 
 def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model, tell: Tell) -> Evidence:
     """Residuals of the drives under a model, and their change by every hypothesis."""
-    residuals, all_signatures = [], []
-    total = len(asked) * len(drives)
-    done = [0]
+    done = count(1)
 
     def tick() -> None:
-        done[0] += 1
-        tell("simulating each effect along the drive", 0.05 + 0.15 * done[0] / total)
+        tell("simulating each effect along the drive", 0.05 + 0.15 * next(done) / (len(asked) * len(drives)))
 
-    for d in drives:
-        residuals.append(residual(d, model))
-        all_signatures.append(signatures(d, model, asked, base=residuals[-1], tick=tick))
+    residuals = [residual(d, model) for d in drives]
+    all_signatures = [
+        signatures(d, model, asked, base=r, tick=tick) for d, r in zip(drives, residuals, strict=True)
+    ]  # fmt: skip
     begun = [
         h if len(drives) == 1 else replace(h, drive=d.name)
         for d, r, s in zip(drives, residuals, all_signatures, strict=True)
@@ -107,17 +98,14 @@ def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model
     ]
     for d, r, s in zip(drives, residuals, all_signatures, strict=True):
         s += signatures(d, model, begun, base=r)
-    asked = (*asked, *begun)
-    return make_evidence(drives, asked, residuals, all_signatures, model)
+    return make_evidence(drives, (*asked, *begun), residuals, all_signatures, model)
 
 
 def search(
     evidence: Evidence, model: Model, *, level: float, surrogates: int, seed: int, tell: Tell = lambda _t, _s: None
 ) -> Found:
-    """Unknown forms and known effects in one competition; without a form, known effects alone, refitted.
-
-    Effects are asked for only if the test for any effect finds more than chance at this `level`.
-    """
+    """Unknown forms and known effects in one competition; without a form, known effects alone, refitted, and only if
+    the test for any effect finds more than chance at this `level`."""
     tell("comparing known effects", 0.2)
     arena = make_arena(evidence, model)
     # a first answer for whom waits: a tenth of the time that the whole takes
@@ -147,8 +135,7 @@ def search(
         return Found(test, plain, gram, calibration, arena, posterior)
     arena, posterior = _repeated(first, compete(first, begun=begun), model)
     tell(f"so far {_likeliest(arena, posterior)}; refitting in the simulator", 0.7)
-    options = _refitted(evidence, arena, posterior, model)
-    options = sorted(options, key=lambda o: -o.evidence)
+    options = sorted(_refitted(evidence, arena, posterior, model), key=lambda o: -o.evidence)
     return Found(test, plain, gram, calibration, arena, posterior, (), tuple(options))
 
 
@@ -191,11 +178,8 @@ def _repeated(arena: Arena, posterior: Posterior, model: Model) -> tuple[Arena, 
 
 
 def _led(arena: Arena, posterior: Posterior, model: Model) -> Evidence:
-    """The evidence whose drives meet the measured speed under the best set.
-
-    A set with an effect on the measured velocity is led by its own model. Without this, such an effect would get what a
-    load changes of the target speed.
-    """
+    """The evidence whose drives meet the measured speed under the best set: an effect on the measured velocity would
+    get what a load changes of the target speed."""
     evidence, best = arena.evidence, _effects(arena, posterior.best)
     columns = [c for h in best for c in evidence.columns[h]]
     off = np.clip(_start(arena, posterior, posterior.best), evidence.low[columns], evidence.high[columns])
@@ -209,12 +193,9 @@ def _led(arena: Arena, posterior: Posterior, model: Model) -> Evidence:
 
 
 def _around(arena: Arena, found: Refit, slopes: Sequence[FloatArray], chosen: Sequence[int]) -> Arena:
-    """The arena with a set's signatures from the start to its own values.
-
-    Residuals are those that a linear model with these `slopes` would have had at the start, so that the competition can
-    begin again from there. Then the start is as far away for the tolerances as in the simulator: a slip slope of two
-    thirds of the file's is one third off, though it shows as half as much slip again.
-    """
+    """The arena with a set's signatures from the start to its own values, and the residuals that a linear model with
+    these `slopes` would have had at the start. Then the start is as far away for the tolerances as in the simulator: a
+    slip slope of two thirds of the file's is one third off, though it shows as half as much slip again."""
     columns = [c for h in chosen for c in arena.evidence.columns[h]]
     parts = []
     for p in arena.parts:
@@ -255,9 +236,7 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
             rest = tuple(b for b in m if arena.name(b) not in names)
             if rest and rest not in done:
                 left = one(rest)
-                done[rest] = (
-                    left if left is None or left.refit is None or not silent(left.refit, arena, noises) else None
-                )
+                done[rest] = None if left and left.refit and silent(left.refit, arena, noises) else left
     within = {}  # the members of a refitted set that are not at a physical bound
     for m, o in done.items():
         if o is not None and o.refit is not None:
@@ -292,10 +271,8 @@ def _without_effect(refit: Refit) -> bool:
 
 
 def _relieved(options: dict[Members, Option]) -> dict[Members, Option]:
-    """Options where the simulator may as well have the response exactly.
-
-    Of a set, no more than of any smaller one in it: one more effect must not make up for a response that is not exact.
-    """
+    """Options where the simulator may as well have the response exactly; of a set, no more than of any smaller one in
+    it."""
     out = {}
     for members, o in options.items():
         least = min(own.relief for m, own in options.items() if set(m) <= set(members))
@@ -306,11 +283,9 @@ def _relieved(options: dict[Members, Option]) -> dict[Members, Option]:
 def _levelled(
     evidence: Evidence, arena: Arena, options: dict[Members, Option], best: Members, equal: set[Members]
 ) -> list[Option]:
-    """Options whose evidence does not rest on what no log shows, or no law of water knows.
-
-    A relation holds on every log: that it takes more effects, in these sizes, is no evidence against it. Near floating,
-    slip is proportional to one over the square of the remaining contact: the form of the law decides, which nobody has.
-    """
+    """Options whose evidence does not rest on what no log shows, or no law of water knows. That a relation takes more
+    effects, in these sizes, is no evidence against it. Near floating, slip is proportional to one over the square of
+    the remaining contact: the form of the law decides."""
     top = options.get(best)
     structure = STRUCTURE * max(0.0, *(o.evidence for o in options.values()))
     of_water = {m for m in (best, *options) if any(evidence.asked[h].of_water for h in _effects(arena, m))}
@@ -321,10 +296,8 @@ def _levelled(
             if top is None or top.refit is None or not _plausible(o.refit):
                 continue
             gained = top.evidence - 0.5 * max(o.refit.loss - top.refit.loss, 0.0)
-        elif (
-            # an effect in place of another; one more has no better claim than its evidence
-            top is not None and members != best and len(members) <= len(best) and {members, best} <= of_water
-        ):
+        # an effect in place of another; one more has no better claim than its evidence
+        elif top is not None and members != best and len(members) <= len(best) and {members, best} <= of_water:
             gained = min(top.evidence, o.evidence + FORM * max(top.evidence, 0.0))
         more = len(best if members in equal else members) - 1
         out.append(replace(o, evidence=gained - structure * max(more, 0)))
@@ -335,9 +308,7 @@ def _evidence(
     arena: Arena, found: Refit, own: Sequence[int], measure: Metric, nothing: float
 ) -> tuple[float, float]:  # fmt: skip
     """Log of the marginal likelihood of a refitted set with its prior, in the linear model at its values: with doubts
-    in what it shows, and where the simulator has this exactly.
-
-    `nothing`: half the sum of squares without any effect.
+    in what it shows, and where the simulator has this exactly. `nothing`: half the sum of squares without any effect.
     """
     columns = [c for h in own for c in arena.evidence.columns[h]]
     J = measure.rows(found.signatures) * arena.sd[columns, None]
@@ -361,11 +332,8 @@ def _evidence(
 
 def _doubtful(arena: Arena, found: Refit) -> list[FloatArray]:
     """What each value shows in one channel, in that channel and in each other one of its unit, where it is large there.
-
-    (m, C, n) of each drive. No simulator has a car's response exactly: a body that pitches on a slope lets the
-    accelerometer show more than the slope, against the wheels and against the torque. A second effect must not make up
-    for that.
-    """
+    (m, C, n) of each drive. A body that pitches on a slope lets the accelerometer show more than the slope, against the
+    wheels and the torque: a second effect must not make up for that."""
     channels = arena.parts[0].channels
     count, off = len(channels), found.off
     size, noise = np.zeros((off.size, count)), np.zeros(count)
@@ -373,11 +341,8 @@ def _doubtful(arena: Arena, found: Refit) -> list[FloatArray]:
         size += ((off[:, None, None] * found.signatures[p.drive][..., p.at][..., p.mask]) ** 2).sum(axis=-1)
         noise += (found.residuals[p.drive][:, p.at][..., p.mask] ** 2).sum(axis=-1)
     units = [CHANNELS[c].unit for c in channels]
-    large = [
-        (k, c, to)
-        for k, c, to in np.ndindex(off.size, count, count)
-        if units[c] == units[to] and size[k, c] > noise[to]
-    ]
+    every = np.ndindex(off.size, count, count)
+    large = [(k, c, to) for k, c, to in every if units[c] == units[to] and size[k, c] > noise[to]]
     out = []
     for own in found.signatures:
         each = np.zeros((len(large), *own.shape[1:]))
@@ -390,12 +355,8 @@ def _doubtful(arena: Arena, found: Refit) -> list[FloatArray]:
 def _chosen(evidence: Evidence, arena: Arena, posterior: Posterior) -> tuple[list[Members], set[Members]]:
     """The sets that are refitted; those of them that a relation makes equal to the best one."""
     linear, best = dict(posterior.sets), posterior.best
-    chosen: list[Members] = []
-    total = 0.0
-    for (members, _), q in zip(posterior.sets, posterior.probability.tolist(), strict=True):
-        if total < COVERED and len(chosen) < REFITTED:
-            chosen.append(members)
-        total += q
+    covered = 1 + int(np.searchsorted(np.cumsum(posterior.probability), COVERED))
+    chosen = [members for members, _ in posterior.sets[: min(covered, REFITTED)]]
     by_hypothesis = {b.tag: i for i, b in enumerate(arena.blocks)}
     equal: set[Members] = set()
 
@@ -442,11 +403,8 @@ def _plausible(r: Refit) -> bool:
 
 
 def sharpened(found: Found, option: Option, model: Model) -> tuple[Refit | None, float]:
-    """An option's values with only a part of the tolerances, and its loss there: it distinguishes places of one effect.
-
-    All tolerances together can hide a wrong place: the form of a tyre's curve absorbs a difference between left and
-    right wheel.
-    """
+    """An option's values with only a part of the tolerances, and its loss there: all of them can hide a wrong place, as
+    the form of a tyre's curve absorbs a difference between left and right wheel."""
     if option.refit is None:
         return None, math.nan
     evidence, own = found.arena.evidence, _effects(found.arena, option.members)

@@ -115,11 +115,9 @@ def first_of(
 def searched(
     blocks: Sequence[Block], inner: FloatArray, may_join: MayJoin, *, width: int = WIDTH
 ) -> dict[Members, float]:  # fmt: skip
-    """Evidence of the sets that are visited: the best ones of each size carried on, then members exchanged.
-
-    `inner` (K + 1, K + 1): inner products of all columns, the residual last; `may_join`: whether a block may join the
-    set of a state; `width`: sets that are carried on.
-    """
+    """Evidence of the sets that are visited: the best ones of each size carried on, then members exchanged. `inner` (K
+    + 1, K + 1): inner products of all columns, the residual last; `may_join`: whether a block may join the set of a
+    state; `width`: sets that are carried on."""
 
     together = packed(blocks)
 

@@ -1,9 +1,5 @@
-"""Unknown forms: the response of a mechanism, times a smooth function of one or two coordinates of the drive.
-
-A force that no effect of the library is, an accelerometer whose gain goes with speed, a slip that grows in a band of
-torque: each is the simulated response to a constant deviation, modulated over the drive. Responses follow within 0.1 s,
-so a modulation needs no further simulation.
-"""
+"""Unknown forms: the response of a mechanism to a constant deviation, times a smooth function of one or two coordinates
+of the drive. Responses follow within 0.1 s, so a modulation needs no further simulation."""
 
 from __future__ import annotations
 
@@ -23,12 +19,10 @@ __all__ = ["ALONG", "MECHANISMS", "Mechanism", "Shape", "shapes"]
 
 @dataclass(frozen=True, slots=True)
 class Mechanism:
-    """`source`: effect and place whose signature is the response, in `unit`; `usual` size of a deviation, and
-    the one by which a car and its simulation differ anyway. `family`: whether there is a form is asked of all of these.
-
-    `over`: coordinates of its functions, alone or in pairs; `scales`: the signal that it multiplies, on which what it
-    does depends as well.
-    """
+    """`source`: effect and place whose signature is the response, in `unit`; `usual` size of a deviation, and the one
+    by which a car and its simulation differ anyway; `family`: whether there is a form is asked of all of these; `over`:
+    coordinates of its functions, alone or in pairs; `scales`: the signal that it multiplies, on which what it does
+    depends as well."""
 
     name: str
     title: str
@@ -48,11 +42,8 @@ class Mechanism:
         return self.name == f"{self.family}_all"
 
     def change(self, size: FloatArray) -> FloatArray:
-        """Change of the effect's value that acts as this size of the response does; NaN where no value does.
-
-        They are the same, but for what acts as one over its value: twice the slip is half the slip slope. The response
-        is that to a step from the file's value, in units of that step.
-        """
+        """Change of the effect's value that acts as this size of the response does; NaN where no value does. They are
+        the same, but for what acts as one over its value, whose response is that to a step from the file's value."""
         effect = EFFECTS.get(self.source.partition("@")[0])
         if effect is None or not effect.drive.divides:
             return size
@@ -68,11 +59,8 @@ _STATE = (
 
 
 def _over(*more: str | tuple[str, str], without: str = "") -> tuple[tuple[str, ...], ...]:
-    """Each coordinate of the driving state alone, without some, and others.
-
-    No mechanism has both torque and acceleration: their difference is the residual of the balance, with its noise. Of
-    lateral acceleration and yaw rate, which go together, sensors and radii have the first one.
-    """
+    """Each coordinate of the driving state alone, without some, and others. No mechanism has both torque and
+    acceleration: their difference is the residual of the balance, with its noise."""
     state = tuple((n,) for n in _STATE if n not in without.split())
     return (*state, *((n,) if isinstance(n, str) else n for n in more))
 
@@ -128,10 +116,8 @@ MECHANISMS: tuple[Mechanism, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A mechanism over coordinates: `basis` (n, K) with the covariance of its coefficients at a usual size of one.
-
-    `manner`: in words, where it is no smooth function.
-    """
+    """A mechanism over coordinates: `basis` (n, K) with the covariance of its coefficients at a usual size of one;
+    `manner`: in words, where it is no smooth function."""
 
     mechanism: Mechanism
     coordinates: tuple[str, ...]

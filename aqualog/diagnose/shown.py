@@ -26,12 +26,9 @@ _ORDINAL = ("the first", "the second", "the last")
 
 
 def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Container[tuple[str, str]]) -> tuple[str, ...]:
-    """What speaks against naming some members of a refitted set, by their keys and drives; empty if nothing does.
-
-    Each third of the drives that says something of a value must give it the same sign, and must be predicted better
-    with the values of the other two thirds than without the set. No value may stand at its physical bound, and effects
-    must not cancel each other.
-    """
+    """What speaks against naming some members of a refitted set, by their keys and drives; empty if nothing does. Each
+    third of the drives must give a value the same sign, if any, and must be predicted better with the values of the
+    others than without the set. No value may stand at its physical bound, and effects must not cancel each other."""
     off = refit.off
     G, b = (x.sum(axis=1) for x in _by_third(refit, arena, noises))
     prior = np.diag(np.array([h.parameter(n).sigma for h, n in refit.names]) ** -2.0)
@@ -64,10 +61,8 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
 
 
 def silent(refit: Refit, arena: Arena, noises: Sequence[Noise]) -> frozenset[str]:
-    """Names in a refitted set that are worth naming but do not make the measurement likelier, each beside the others.
-
-    One that needs wheel speeds must do so in their channels: a simulator's error in fast movements is in others.
-    """
+    """Names in a refitted set that are worth naming but do not make the measurement likelier, each beside the others;
+    what needs wheel speeds must do so in their channels."""
     G, b = (x.sum(axis=0) for x in _by_third(refit, arena, noises))
     # without a reference velocity they are those between axles and sides
     wheels = np.array(["slip" in c for c in arena.evidence.drives[0].channels])

@@ -1,10 +1,6 @@
-"""A force that changes over minutes: what is slow in the force balance and not in the accelerometer.
-
-Slow noise follows any slow function, so in the competition a smooth function over time is no form. Two channels know
-more: an error of the accelerometer is in the force balance and in the kinematic channel alike, a slope in the
-kinematic one alone, a force in the force balance alone. What remains is compared with what forces on measured cars
-wander by anyway: gusts, bends, the road's surface.
-"""
+"""A force that changes over minutes: what is slow in the force balance and not in the accelerometer. An error of the
+accelerometer is in both channels alike, a slope in the kinematic one alone, a force in the force balance alone. What
+remains is compared with what forces on measured cars wander by anyway: gusts, bends, the road's surface."""
 
 from __future__ import annotations
 
@@ -34,11 +30,9 @@ OVER = ("v_x", "torque")  # of the coordinates whose functions compete already, 
 
 
 def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None:
-    """The form of a force over time in what a model leaves (C, m) of a drive; None unless its probability is 0.95.
-
-    The evidence is that of a wander of a force's usual size against the usual wander, over windows that count as
-    independent after their own correlation: n (1 - rho) / (1 + rho).
-    """
+    """The form of a force over time in what a model leaves (C, m) of a drive; None unless its probability is 0.95. The
+    evidence is that of a wander of a force's usual size against the usual wander, over windows that count as
+    independent after their own correlation: n (1 - rho) / (1 + rho)."""
     if drive.course.lanes or not {"force_balance", "kinematic"} <= set(drive.channels):
         return None  # on water no law of drag is exact
     t, s, whole, apart = _wander(drive, left)
@@ -81,11 +75,9 @@ def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None
 
 
 def _wander(drive: Drive, left: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Middles of windows [s], what force balance and wheels against torque show alike there [m/s²], each (k,), and the
-    mean square of their difference [m²/s⁴].
-
-    Means over windows of 10 s, 0 where the two disagree. For the test without what goes with speed and torque.
-    """
+    """Middles of windows of 10 s [s], what force balance and wheels against torque show alike there on average, 0 where
+    they disagree, without what goes with speed and torque and with it [m/s²], each (k,), and the mean square of the
+    accelerometer's own [m²/s⁴]."""
     step = block_step(drive.dt)
     number = (np.arange(left.shape[1]) * step // WINDOW_S).astype(np.intp)
     known = drive.mask & np.isfinite(left).all(axis=0)

@@ -1,9 +1,6 @@
 """Inner products of residuals under their noise: an autoregression first, the smoothed spectrum of its remainder then.
-
-The autoregression of `noise` handles gaps, outliers and long memory. What it leaves of the colour would inflate some
-directions and not others; whitening by the remainder's own cross spectrum takes that off, so that the gain of any
-column under noise alone follows its chi-squared distribution. Surrogates of the noise are then draws of normal numbers.
-"""
+What the autoregression of `noise` leaves of the colour is taken off by the remainder's own cross spectrum, so that the
+gain of any column under noise alone follows its chi-squared distribution."""
 
 from __future__ import annotations
 
@@ -33,9 +30,8 @@ class Weighing:
     """Turns residual-shaped arrays (C, n) of one drive into rows whose inner products are twice log-likelihoods.
 
     `inverse` (2, C, C, F): real and imaginary parts of roots of the inverse cross spectra of the whitened remainder,
-    lower triangular, scaled so that the squares of lines sum to the signal's; `used` (n,) its samples. `sharpness`:
-    half the log determinant of the noise's covariance, without a constant, so that half the inner product of a residual
-    with itself and this is its negative log-likelihood.
+    lower triangular, scaled so that the squares of lines sum to the signal's; `used` (n,) its samples; `sharpness`:
+    half the log determinant of the noise's covariance, without a constant.
     """
 
     noise: Noise
@@ -94,10 +90,8 @@ def _unrelated(lines, inverse, out):  # type: ignore[no-untyped-def]
 
 
 def weighing(residuals: Sequence[FloatArray] | FloatArray, mask: BoolArray, contrasts: FloatArray) -> Weighing:
-    """The weighing by the noise of residuals (C, n) from which known effects have been subtracted.
-
-    Several residuals are draws of one: what is subtracted is not exactly known.
-    """
+    """The weighing by the noise of residuals (C, n) from which known effects have been subtracted; several are draws of
+    one."""
     noise = fit_noise(residuals[0], mask, contrasts)
     used = np.asarray((noise.weights > 0.0).any(axis=0))
     count = int(used.sum())

@@ -24,11 +24,9 @@ NUGGET = 1e-3
 
 
 class Basis(NamedTuple):
-    """Columns (n, K) of functions of one or two coordinates; `prior` (K, K) covariance of their coefficients.
-
-    `points` (k, d) where the function is reported, `at_points` (k, K) the columns there, `supported` (k,) whether the
-    drive was there long enough.
-    """
+    """Columns (n, K) of functions of one or two coordinates; `prior` (K, K) covariance of their coefficients; `points`
+    (k, d) where the function is reported, `at_points` (k, K) the columns there, `supported` (k,) whether the drive was
+    there long enough."""
 
     names: tuple[str, ...]
     columns: FloatArray
@@ -57,10 +55,8 @@ class _Axis(NamedTuple):
 
 
 def basis(names: tuple[str, ...], z: Sequence[FloatArray], mask: BoolArray, dt: float) -> Basis | None:
-    """Functions of one or two coordinates (n,) [SI], NaN where unknown; None where the drive does not vary them.
-
-    The functions are zero where a coordinate is unknown. `mask` (n,): samples that count, at the step `dt` [s].
-    """
+    """Functions of one or two coordinates (n,) [SI], zero where unknown (NaN); None where the drive does not vary them.
+    `mask` (n,): samples that count, at the step `dt` [s]."""
     known = mask & np.isfinite(np.sum(z, axis=0))
     if np.count_nonzero(known) < max(LEAST_FINITE * np.count_nonzero(mask), 2):
         return None

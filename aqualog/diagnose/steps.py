@@ -26,10 +26,8 @@ INTERVALS, PART = 5, 0.1  # the most intervals of a form, each with this share o
 
 
 def clipped(left: FloatArray, used: BoolArray, *, lasts: int = LASTS) -> FloatArray:
-    """What is left in white noise (C, n), without outliers from the median of so many samples to either side.
-
-    A kerb or a shift of a second is no form, what `lasts` longer is. Without a median none of it is.
-    """
+    """What is left in white noise (C, n), without outliers from the median of so many samples to either side: a kerb or
+    a shift of a second is no form, what `lasts` longer is."""
     most = OUTLIER * np.median(np.abs(left[:, used]), axis=1, keepdims=True)
     if lasts:
         near = np.pad(left, [(0, 0), (lasts, lasts)], mode="edge")
@@ -56,10 +54,8 @@ def begun(weight: FloatArray, score: FloatArray) -> tuple[int, int]:
 
 
 def intervals(weight: FloatArray, score: FloatArray) -> list[tuple[int, int, int]]:
-    """Offsets that begin and end, suddenly or slowly, each the one that explains most beside those before.
-
-    Each from a sample to another, with slopes of so many samples.
-    """
+    """Offsets that begin and end, suddenly or slowly, each the one that explains most beside those before: from a
+    sample to another, with slopes of so many samples."""
     n = weight.size
     at = np.linspace(0, n, EDGES + 1).astype(np.intp)
     i, j = np.triu_indices(EDGES + 1, 1)
@@ -141,12 +137,10 @@ def gain_of(columns: FloatArray, weight: FloatArray, score: FloatArray) -> float
 def moments(
     drive: Drive, residual: FloatArray, asked: Sequence[Hypothesis], signatures: Sequence[FloatArray]
 ) -> tuple[Hypothesis, ...]:
-    """Each effect that begins during the drive at each wheel, with the begin and duration that explain most.
-
-    The response of the effect that `DriveSearch.begins_like` names, times a ramp, stands for it: no simulation of each
-    moment is needed. The noise is taken as white, for what is slow must not count as noise here. `residual` (C, n);
-    `asked` and their `signatures` (k, C, n): the other hypotheses.
-    """
+    """Each effect that begins during the drive at each wheel, with the begin and duration that explain most. The
+    response of the effect that `DriveSearch.begins_like` names, times a ramp, stands for it, in white noise: what is
+    slow must not count as noise here. `residual` (C, n); `asked` and their `signatures` (k, C, n): the other
+    hypotheses."""
     white = white_noise(residual, drive.mask, contrasts(drive.channels)).rotation
     left = clipped(white @ residual, drive.mask)
     dt = block_step(drive.dt)

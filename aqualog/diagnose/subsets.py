@@ -1,11 +1,9 @@
 """Sets of effects: those that may stand together, those that look alike on every log, and those that a log supports.
 
-In addition to the twins of an effect, which look like it one by one, two effects together may look like a third one on
-every log: an accelerometer reads a slope like an offset, while the force balance responds to the offset like to a
-rolling resistance. No drive breaks such a relation, so the smaller set has no better evidence than the larger one.
-
-Effects that act everywhere must also show off the water. On water, errors of the water laws shape the residual. A wheel
-with little contact amplifies any slip, and two dry effects that cancel on dry road could replace a wrong water law.
+Two effects together may look like a third one on every log: an accelerometer reads a slope like an offset, while the
+force balance responds to the offset like to a rolling resistance. So the smaller set has no better evidence than the
+larger one. Effects that act everywhere must also show off the water: on it, errors of the water laws shape the
+residual.
 """
 
 from __future__ import annotations
@@ -34,11 +32,9 @@ LEAST = 300  # samples off the water that the check needs at the least
 
 
 def compatible(evidence: Evidence, members: Sequence[int]) -> bool:
-    """Whether a set holds each effect once per wheel, in one variant, and does not delay every signal.
-
-    Delays are relative: a delay of all signals that are compared with each other only shifts the start of their clock,
-    and one of all but one signal is that signal's own, with the other sign. Those of turning are apart from the others.
-    """
+    """Whether a set holds each effect once per wheel, in one variant, and does not delay every signal. A delay of all
+    signals that are compared with each other only shifts the start of their clock, and one of all but one is that
+    signal's own, with the other sign. Those of turning are apart from the others."""
     own = [evidence.asked[m] for m in members]
     if len({h.effect.name for h in own}) == len(own):
         return True
@@ -65,10 +61,7 @@ def compatible(evidence: Evidence, members: Sequence[int]) -> bool:
 
 def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tuple[int, ...]]:
     """Sets of hypotheses that a relation makes equal to `members`, none of which holds them all; sorted indices.
-
-    Any two effects of a relation span what all three do. Effects are taken at the whole car or at their usual place;
-    none joins its own twin.
-    """
+    Effects are taken at the whole car or at their usual place; none joins its own twin."""
     out = []
     for relation in [(e.name, *others) for e in EFFECTS.values() for others in e.drive.equals]:
         usual = {
@@ -87,10 +80,8 @@ def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tupl
 
 
 def supported(evidence: Evidence) -> Evidence:
-    """The evidence without effects that have no gain off the water; the same evidence on dry drives.
-
-    Effects of water are exempt, and so are drives that are wet nearly all the time.
-    """
+    """The evidence without effects that have no gain off the water; the same evidence on dry drives, and on those that
+    are wet nearly all the time. Effects of water are exempt."""
     if not any(d.course.lanes for d in evidence.drives):
         return evidence
     dry = [d.mask & (stretches(d) == 0) for d in evidence.drives]

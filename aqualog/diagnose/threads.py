@@ -23,12 +23,8 @@ def _begin() -> None:
 
 
 def beside(work: Callable[[T], R], items: Iterable[T]) -> list[R]:
-    """Return the results of `work` for each item, in their order, from two threads.
-
-    Within such a thread the items are done one after the other; a single one has both threads for itself. The threads
-    stay: each new one would take memory of its own from the system, which it does not give back (500 MB in a
-    diagnosis).
-    """
+    """Return the results of `work` for each item, in their order, from two threads that stay, one after the other
+    within such a thread; each new thread would take memory that it does not give back."""
     items = list(items)
     if len(items) < 2 or getattr(_own, "inside", False):
         return [work(x) for x in items]

@@ -1,11 +1,7 @@
-"""Quantities that no vehicle file or simulator has exactly: taken into account, but never reported as causes.
-
-The geometry of curves, the height of the centre of mass, the yaw inertia, the form of a tyre's curve, offsets of
-steering and gyro. Each has the form of an effect, so that simulation gives its change of the residuals. `friction` is
-mostly the curvature of a tyre's curve well below its peak: laws go from a parabola to a straight line. `radius_loss`:
-wheels that carry more roll on less radius, in curves the outer ones. `antenna_height`: a car pitches by 0.01 rad per
-m/s² at the most, 1 m below an antenna on its roof (K).
-"""
+"""Quantities that no vehicle file or simulator has exactly: taken into account, but never reported as causes. Each has
+the form of an effect. `friction` is mostly the curvature of a tyre's curve well below its peak: laws go from a parabola
+to a straight line. `radius_loss`: wheels that carry more roll on less radius, in curves the outer ones.
+`antenna_height`: a car pitches by 0.01 rad per m/s² at the most, 1 m below an antenna on its roof (K)."""
 
 from __future__ import annotations
 
@@ -69,13 +65,8 @@ TOLERANCES: tuple[Effect, ...] = (
 )  # fmt: skip
 
 # the torque that the model needs on a flat road, in place of a missing one: load, wind and slopes are not in it
-STAND_IN = _of(
-    "stand_in_torque",
-    "torque in place of a missing one, relative",
-    "-",
-    0.2,
-    _plant(lambda p, x: p._replace(torque_gain=p.torque_gain * (1.0 + x))),
-)
+STAND_IN = _of("stand_in_torque", "torque in place of a missing one, relative", "-", 0.2,
+               _plant(lambda p, x: p._replace(torque_gain=p.torque_gain * (1.0 + x))))  # fmt: skip
 
 # What one lane may differ by from the other lanes, of the size of an effect on all of them: its depth is known to 15 %,
 # and the form of a law makes another error at each depth and speed. From sources, full aquaplaning falls with depth as

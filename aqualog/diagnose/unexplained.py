@@ -43,7 +43,6 @@ DRAWS, LEVEL = 400, 0.95  # of the function, for a band that holds at all points
 
 class Clear(NamedTuple):
     """A mechanism that no known effect replaces: its blocks, `first` the most needed one, and its probability.
-
     `instead`: mechanisms of its family that the drive cannot distinguish from it; `without`: their blocks in the best
     set, which does as well with this one alone. `loss`: what the best set loses without it [nats (natural logarithm)].
     """
@@ -59,12 +58,10 @@ class Clear(NamedTuple):
 def clear_forms(
     field: Field, found: Sets, inner: FloatArray, shows: Callable[[tuple[int, ...]], bool] = lambda _: True
 ) -> list[Clear]:
-    """Mechanisms of the best set that no known effect replaces, what explains most first.
-
-    A mechanism counts if its family has a share of 0.95 of the posterior, the best set is e^3 times as likely as every
-    set of known effects, its blocks show in the drives, and it explains a fifth of what the set explains, without
-    mechanisms that do not show. What a family explains together is its most needed mechanism's.
-    """
+    """Mechanisms of the best set that no known effect replaces, what explains most first. One counts if its family has
+    a share of 0.95 of the posterior, the best set is e^3 times as likely as every set of known effects, its blocks show
+    in the drives, and it explains a fifth of what the set explains. What a family explains together is its most needed
+    mechanism's."""
     blocks, best = field.blocks, found.best
     known = max(e for members, e in found.sets if all(blocks[m].kind != "shape" for m in members))
     if found.sets[0][1] - known < AHEAD:
@@ -120,10 +117,9 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
     """Shapes of the best set that no known effect replaces, what explains most first; empty if none is that clear.
 
     Beside the conditions of `clear_forms`, a mechanism must explain 5 % of what the others leave of a channel, or of a
-    difference between axles or sides. What it explains must be large. Half of that is enough for a smooth function that
-    surely reaches twice what a car and its simulation differ by anyway; one that may be smaller than that everywhere,
-    or constant, is no finding. And no effect of the library may stand for it: a load of a fifth of the car looks
-    like a torque that goes with the torque.
+    difference between axles or sides, and that must be large. Half is enough for a smooth function that surely reaches
+    twice what a car and its simulation differ by anyway; one that may be smaller everywhere, or constant, is no
+    finding. And no effect of the library may look like it.
     """
     whole = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
 
@@ -163,13 +159,12 @@ def _function(field: Field, fit: Fitted, block: int) -> tuple[FloatArray, FloatA
 
 
 def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitted) -> tuple[float, float, str]:
-    """Rms of what shapes explain over what is large, the largest share of a channel's variance, and that channel.
+    """Rms of what shapes explain over what is large, the largest share of the variance that the others leave of a
+    channel, and that channel.
 
-    The share is of what the others of the set leave. Between axles and sides the reference velocity's noise, which is
-    in the slip of all wheels, cancels. What the wheels do must show in their slip: a simulator's error in fast
-    movements is in other channels. A smooth function of speed, torque or braking must explain some of the variance
-    where half of its energy is, too: else it is an offset in one kind of driving, as simulators have it when a car
-    brakes to a stop.
+    Between axles and sides the reference velocity's noise, which is in the slip of all wheels, cancels. What the wheels
+    do must show in their slip. A smooth function of speed, torque or braking must explain some of the variance where
+    half of its energy is, too: else it is an offset in one kind of driving, as simulators have it.
     """
     channels = arena.parts[0].channels
     names, turned = _with_differences(channels)
@@ -225,9 +220,8 @@ def _with_differences(channels: tuple[str, ...]) -> tuple[list[str], FloatArray]
     """Channels, and after them the differences of axles and sides where each wheel's slip is one. Names, rows (k, C)"""
     at = [i for i, c in enumerate(channels) if c in _SLIPS]
     rows = contrasts(channels)[at[1:]] if len(at) == len(_SLIPS) else np.zeros((0, len(channels)))
-    return [*channels, *("axle_slip", "side_slip_f", "side_slip_r")[: len(rows)]], np.concatenate(
-        [np.eye(len(channels)), rows]
-    )
+    names = [*channels, *("axle_slip", "side_slip_f", "side_slip_r")[: len(rows)]]
+    return names, np.concatenate([np.eye(len(channels)), rows])
 
 
 def described(

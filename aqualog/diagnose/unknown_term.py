@@ -23,10 +23,8 @@ SHORT_HOLE = 4  # points; a longer stretch without data is nominal
 
 
 def as_term(remainder: Remainder) -> Term | None:
-    """The term that takes a remainder into the model: the function within the driven range, zero a little outside.
-
-    None if the model has no table for this mechanism over these coordinates, or beyond physical bounds.
-    """
+    """The term that takes a remainder into the model: the function within the driven range, zero a little outside; None
+    if the model has no table for it, or beyond physical bounds."""
     x, at = remainder.x[:, 0], np.flatnonzero(np.isfinite(remainder.f))
     if (remainder.mechanism, remainder.depends_on) != _CARRIED or not at.size:
         return None

@@ -25,10 +25,8 @@ Causes = tuple[tuple[Cause, bool], ...]
 
 @dataclass(frozen=True, slots=True)
 class Candidate(Generic[Option]):
-    """A set's causes, whether each is worth naming, its log `evidence` and its `share` of the posterior.
-
-    `torn`: sets with the same effects at other wheels, between which and this one nothing decides.
-    """
+    """A set's causes, whether each is worth naming, its log `evidence` and its `share` of the posterior; `torn`: sets
+    with the same effects at other wheels, between which and this one nothing decides."""
 
     option: Option
     causes: Causes
@@ -49,11 +47,9 @@ class Candidate(Generic[Option]):
 
 
 class Outcome(NamedTuple, Generic[Option]):
-    """Verdict, causes, alternatives; `best`: the set that the extended model is made of, None without causes.
-
+    """Verdict, causes, alternatives; `best`: the set that the extended model is made of, None without causes;
     `certain`: effects beyond doubt; `rivals`: what remains, with its share, where the causes cannot be distinguished;
-    `notes`: what is too small to be worth naming, what other places are as likely, what speaks against a name.
-    """
+    `notes`: what is too small, what other places are as likely, what speaks against a name."""
 
     verdict: Verdict
     causes: tuple[Cause, ...] = ()
@@ -82,10 +78,8 @@ class Outcome(NamedTuple, Generic[Option]):
 def candidates(
     options: Sequence[tuple[Option, float]], causes: Callable[[Option], Causes | None]
 ) -> list[Candidate[Option]]:  # fmt: skip
-    """Options and their log evidence as sets with causes, most likely first, without those that hardly count.
-
-    None for causes: a set that stands for another one, which has its share.
-    """
+    """Options and their log evidence as sets with causes, most likely first, without those that hardly count; None for
+    causes: a set that stands for another one, which has its share."""
     if not options:
         return []
     p = shares([e for _, e in options]).tolist()
@@ -106,12 +100,9 @@ def decided(
     pick: Callable[[Sequence[Candidate[Option]]], Candidate[Option]],
     failing: Callable[[Candidate[Option]], Sequence[str]],
 ) -> Outcome[Option]:
-    """The verdict on sets without an unknown form.
-
-    A name needs a probability of 0.95. Else the answer is what the posterior consists of, up to 0.95. Sets whose causes
-    worth naming are the same count together: `pick` says which one of a group that differs in places only stands for
-    it, `failing` what speaks against naming a set's causes.
-    """
+    """The verdict on sets without an unknown form. A name needs a probability of 0.95. Else the answer is what the
+    posterior consists of, up to 0.95. Sets whose causes worth naming are the same count together: `pick` says which one
+    of a group that differs in places only stands for it, `failing` what speaks against naming a set's causes."""
     groups: dict[frozenset[str], list[Candidate[Option]]] = {}
     marginal: dict[tuple[str, Sequence[str]], float] = {}
     for s in sets:

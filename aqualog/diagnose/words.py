@@ -12,16 +12,8 @@ from aqualog.diagnose.records import SURE, Cause, Estimate
 from aqualog.model.term import Effect, Term
 
 __all__ = [
-    "CERTAIN",
-    "PLACES",
-    "cause_sentence",
-    "listed",
-    "name_of",
-    "place",
-    "quantity",
-    "term_words",
-    "verdict_sentence",
-]
+    "CERTAIN", "PLACES", "cause_sentence", "listed", "name_of", "place", "quantity", "term_words", "verdict_sentence",
+]  # fmt: skip
 
 MANY_UNTESTED = 5  # more than those of water, which no dry road shows
 CERTAIN = "Certain: "  # how a sentence begins that knows some causes, where others cannot be distinguished
@@ -93,23 +85,14 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 
 
 def verdict_sentence(
-    verdict: str,
-    causes: Sequence[Cause],
-    *,
-    level: float,
-    reason: str = "",
-    certain: frozenset[str] = frozenset(),
-    seen: float | None = None,
-    source: str = "log",
-    untested: Mapping[str, str] | None = None,
+    verdict: str, causes: Sequence[Cause], *, level: float, reason: str = "", certain: frozenset[str] = frozenset(),
+    seen: float | None = None, source: str = "log", untested: Mapping[str, str] | None = None,
     moved: Sequence[Term] = (),
-) -> str:
-    """The verdict in one sentence, of a log that can be tested.
-
-    `certain`: effects that are certain where others cannot be distinguished; `seen`: the test's p-value where it
-    found more than noise; `source`: `log` or `campaign`; `untested`: effects that the log cannot show, and why;
-    `moved`: values of the vehicle file that the model has otherwise.
-    """
+) -> str:  # fmt: skip
+    """The verdict in one sentence, of a log that can be tested. `certain`: effects that are certain where others cannot
+    be distinguished; `seen`: the test's p-value where it found more than noise; `source`: `log` or `campaign`;
+    `untested`: effects that the log cannot show, and why; `moved`: values of the vehicle file that the model has
+    otherwise."""
     names = [name_of(c.effect, c.where) + (f" in {listed(c.drives)}" if c.drives else "") for c in causes]
     if verdict == "no_effect" and seen is not None:
         return f"No effect is named: more than noise is left (p = {seen:.2g}), but no known effect explains it clearly."

@@ -45,10 +45,8 @@ class _Run(NamedTuple):
 
 
 def advice(passes: Passes, rivals: Sequence[Option], scatter: Fit) -> Manoeuvre | None:
-    """Five runs of the catalogue that best distinguish the two most likely sets.
-
-    None with fewer than two. The answer is `none` where no run does.
-    """
+    """Five runs of the catalogue that best distinguish the two most likely sets; `none` where no run does, None with
+    fewer than two sets."""
     if len(rivals) < 2:
         return None
     first, second = rivals[:2]

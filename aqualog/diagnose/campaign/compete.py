@@ -47,10 +47,8 @@ class Option(NamedTuple):
 
 
 class Found(NamedTuple):
-    """`gram` of the effects and `calibration` describe what the runs can distinguish; `nothing`: the model at hand.
-
-    `options`: sets, most likely first; none where there are unknown `forms`, or the test finds no more than chance.
-    """
+    """`gram` of the effects and `calibration` describe what the runs can distinguish; `nothing`: the model at hand;
+    `options`: sets, most likely first, none where there are `forms`, or the test finds no more than chance."""
 
     evidence: Evidence
     significance: Significance
@@ -105,11 +103,8 @@ class _Stand:
 def compete(
     passes: Passes, given: Model, asked: tuple[Hypothesis, ...], o: Options, say: Callable[[str], None]
 ) -> Found:
-    """Unknown forms and sets of known effects with their evidence.
-
-    Signatures are straight lines, effects are not: so unknown forms compete with signatures about the best set of
-    effects, and effects are asked for only if the test for any effect finds more than chance.
-    """
+    """Unknown forms and sets of known effects with their evidence. Forms compete with signatures about the best set of
+    effects; effects are asked for only if the test for any effect finds more than chance."""
     say("signatures of the effects")
     evidence = evidence_of(asked, given)
     shapes, functions = _shapes_of(passes)

@@ -1,8 +1,5 @@
-"""Expected slip and resistance of tyre, water and car at a speed and traction: the simulator's steady equations.
-
-The simulation's right-hand side (`aqualog.model.kernel`) without its time: each wheel's water, contact and slip at the
-traction that was measured, averaged over the fluctuation of contact and water's depth instead of drawn once.
-"""
+"""Expected slip and resistance of tyre, water and car at a speed and traction: the simulator's steady equations. They
+are those of `aqualog.model.kernel` without its time, averaged over the fluctuation of contact and water's depth."""
 
 from __future__ import annotations
 
@@ -43,11 +40,9 @@ class Driven(NamedTuple):
 
 
 class Response(NamedTuple):
-    """Expectation (4, n), or (n,) for the car, and variances over the fluctuation of contact and water.
-
-    `slip` [-] at the given traction, NaN where the contact cannot carry it; `contact` L [-]; `resistance` [m/s²]:
-    deceleration by the water; `lost` (4, n): share of the fluctuation at which the wheel spins.
-    """
+    """Expectation (4, n), or (n,) for the car, and variances over the fluctuation of contact and water: `slip` [-] at
+    the given traction, NaN where the contact cannot carry it; `contact` L [-]; `resistance`: deceleration by the water
+    [m/s²]; `lost` (4, n): share of the fluctuation at which the wheel spins."""
 
     slip: FloatArray
     slip_variance: FloatArray
@@ -58,12 +53,9 @@ class Response(NamedTuple):
 
 
 def respond(setups: Sequence[Setup], which: NDArray[np.int64], wet: NDArray[np.bool_], driven: Driven) -> Response:
-    """Steady response of cars with plants and scenarios, terms applied; the first stretch of each is its water.
-
-    `which` (n,): setup of each sample; `wet` (n,): on the water, or on dry road. The equations omit the wheels'
-    inertia, the pitch of the body, and the drag and wake of a stopped wheel. Near full aquaplaning, where `lost` is not
-    0, these are no longer small.
-    """
+    """Steady response of cars with plants and scenarios, terms applied; the first stretch of each is its water. `which`
+    (n,): setup of each sample; `wet` (n,): on the water. The wheels' inertia, the pitch of the body, and the drag and
+    wake of a stopped wheel are left out: where `lost` is not 0, they are no longer small."""
     plants = [flat(s.plant) for s in setups]
     # as numbers: of records numpy compares the fields name by name, which took as long as the response
     cars, wheels = (np.concatenate([p[i].view(np.float64) for p in plants]).view(plants[0][i].dtype) for i in (0, 1))

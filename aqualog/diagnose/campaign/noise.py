@@ -1,9 +1,7 @@
-"""Scatter of the runs: a run is one vector of channels, independent of the others.
-
-Its deviation from the model has the covariance Sigma + kappa D_r, with D_r the variance of the run's means that contact
-and depth give along its lane, and heavier tails than a normal's (Student's t of `NU` degrees of freedom), so that a run
-with a wrong entry counts little.
-"""
+"""Scatter of the runs: a run is one vector of channels, independent of the others. Its deviation from the model has the
+covariance Sigma + kappa D_r, with D_r the variance of the run's means that contact and depth give along its lane. Its
+tails are heavier than a normal's (Student's t of `NU` degrees of freedom), so that a run with a wrong entry counts
+little."""
 
 from __future__ import annotations
 
@@ -41,12 +39,9 @@ def prior_of(free: int, tested: int = 0) -> FloatArray:
 
 
 def fit(y: FloatArray, x: FloatArray, road: FloatArray, free: FloatArray, start: Fit | None = None) -> Fit:
-    """Sizes and scatter by restricted likelihood (EM).
-
-    `y` (g, c), NaN where not available; `x`, `free` (g, c, k): columns whose sizes have a unit prior, and those of
-    `prior_of`; `road` (g, c): variances; `start`: from where to go on, a good one needs few rounds. The uncertainty of
-    the sizes goes into the scatter, so that many columns do not make it small.
-    """
+    """Sizes and scatter by restricted likelihood (EM), the sizes' uncertainty in the scatter. `y` (g, c), NaN where not
+    available; `x`, `free` (g, c, k): columns whose sizes have a unit prior, and those of `prior_of`; `road` (g, c):
+    variances; `start`: from where to go on."""
     known = np.isfinite(y)
     X = np.where(known[:, :, None], np.nan_to_num(np.concatenate([free, x], axis=-1)), 0.0)
     prior = np.diag(prior_of(free.shape[-1], x.shape[-1]))
@@ -92,10 +87,8 @@ def _kappa(
 
 
 def inner(x: FloatArray, y: FloatArray, free: FloatArray, weight: FloatArray) -> FloatArray:
-    """Inner products (k + 1, k + 1) of columns `x` (g, c, k) and, last, of `y` (g, c), the `free` columns taken out.
-
-    `weight` (g, c, c): precision of each run.
-    """
+    """Inner products (k + 1, k + 1) of columns `x` (g, c, k) and, last, of `y` (g, c), the `free` columns taken out;
+    `weight` (g, c, c): precision of each run."""
     rows = np.concatenate([free, x, y[:, :, None]], axis=-1)
     rows = np.where(np.isfinite(y)[:, :, None], rows, 0.0)
     G = rows.reshape(y.size, -1).T @ (weight @ rows).reshape(y.size, -1)

@@ -29,11 +29,9 @@ Index = NDArray[np.int64]
 
 
 def passes_of(data: CampaignData) -> Passes:
-    """Observations of all runs that are done and whose configuration the model knows.
-
-    A run counts once, however many samples it has: they are averaged. A run is left out where a wheel of the base model
-    loses nearly all of its contact. The measurement plays no part, so that noise does not influence the choice.
-    """
+    """Observations of all runs that are done and whose configuration the model knows, each the means of its samples. A
+    run is left out where a wheel of the base model loses nearly all of its contact: the measurement plays no part in
+    the choice."""
     left_out: Counter[str] = Counter()
     rows: list[Told] = []
     for info in data.done:

@@ -32,10 +32,8 @@ _PLACES = {
 
 
 def conclude(found: Found, passes: Passes, *, seed: int) -> tuple[Outcome[Option], Gain | None]:
-    """The verdict on what a competition found, and the gain of its best set; None without one, or with few wet runs.
-
-    An unknown form comes before any name. A name needs a gain on runs that were not fitted.
-    """
+    """The verdict on what a competition found, and the gain of its best set; None without one, or with few wet runs. An
+    unknown form comes before any name. A name needs a gain on runs that were not fitted."""
     if found.forms:
         return Outcome("unexplained"), None
     won: list[Gain | None] = [None]
@@ -86,9 +84,7 @@ def cause_sentence(effect: Effect, where: str | None, values: Sequence[Estimate]
 
 def gain(passes: Passes, chosen: Refit, found: Found, *, seed: int) -> Gain | None:
     """Leave groups of runs out, fit the sizes on the others, and predict those left out; None with few wet runs.
-
-    `log_score` in nats (natural logarithm) over all runs left out, with a bootstrap interval over runs.
-    """
+    `log_score` over all runs left out, with a bootstrap interval over runs. [nats (natural logarithm)]"""
     wet = np.flatnonzero(np.isfinite(passes.values[:, -1]))
     if wet.size < 2 * FOLDS:
         return None

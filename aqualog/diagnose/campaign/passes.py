@@ -43,11 +43,9 @@ class Question(NamedTuple):
 
 
 class Told(NamedTuple):
-    """A run: configuration and driving state, and its mean observations by name.
-
-    `late`, `grown`: slip added by one second of delay of v_x [1/s] and by radii that grow by 1e-3 s²/m² v², each as (on
-    dry road, on water minus dry road); `seconds` of driving on water that were used.
-    """
+    """A run: configuration and driving state, and its mean observations by name. `late`, `grown`: slip added by one
+    second of delay of v_x [1/s] and by radii that grow by 1e-3 s²/m² v², each as (on dry road, on water minus dry
+    road); `seconds` of driving on water that were used."""
 
     info: RunInfo
     scenario: Scenario
@@ -61,12 +59,13 @@ class Told(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Passes:
-    """Observations of a campaign, one row per run.
+    """Observations of a campaign, one row per run `told` (g,): `values` (g, c) by `names` (c,), NaN where a run has
+    none.
 
-    `values` (g, c), NaN where a run has no value; for each driven wheel `slip_slope_<w>`: mean slip on water minus mean
-    slip on dry road, and `dry_<w>`: mean slip on dry road [-]; `resistance`: mean resistance measure on water minus the
-    run's dry level [m/s²]. `names` (c,). `told` (g,): the runs. `coordinates` by name (g,): `v_x`, `depth`
-    [m], `load`, `pressure` ...; `nuisances` (g, c, k): columns whose size is free. `left_out`: runs, by reason.
+    For each driven wheel `slip_slope_<w>`: mean slip on water minus mean slip on dry road, and `dry_<w>`: mean slip on
+    dry road [-]; `resistance`: mean resistance measure on water minus the run's dry level [m/s²]. `coordinates` by name
+    (g,): `v_x`, `depth` [m], `load`, `pressure`; `nuisances` (g, c, k): columns whose size is free; `left_out`: runs,
+    by reason.
     """
 
     names: tuple[str, ...]
@@ -89,13 +88,12 @@ def question_of(told: Sequence[Told]) -> Question:
 
 
 def doubted(passes: Passes, base: Model) -> Passes:
-    """The same runs with additional columns, before the free ones, for the uncertainty of the expectation itself.
+    """The same runs with columns before the free ones, for what the expectation is off by in all runs alike
+    (`noise.prior_of`).
 
-    The steady expectation is accurate to `STEADY`: one share for all slips on water and one for the resistance. The
-    tyre's curve depends on a friction known to `FRICTION`. Lost contact and drag of an axle follow a law that is known
-    as on single drives, or as well as the vehicle file was calibrated; depths are known to `LABEL`. No law has the
-    right form, so that all of these may change with depth and with speed, by what a lane may differ from the others.
-    These errors are the same in all runs, with that prior (`noise.prior_of`), so that more runs do not reduce them.
+    The steady expectation is accurate to `STEADY`, of slips and resistance each, friction to `FRICTION`, depths to
+    `LABEL`. Lost contact and drag of an axle follow a law that is known as on single drives, or as well as the vehicle
+    file was calibrated. All of these may change with depth and speed by what a lane may differ from the others.
     """
     expected = expected_values(passes, base)[0]
     columns = np.zeros((3, *expected.shape))

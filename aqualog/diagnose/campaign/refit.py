@@ -30,11 +30,9 @@ EDGE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Refit:
-    """A set at its best values.
-
-    `theta` (k,): their distance from the model at hand in prior standard deviations; `x` (g, c, k): change of the
-    observations by one of those there; `residual` (g, c); `at_bound` if a value sits at its physical bound.
-    """
+    """A set at its best values: `theta` (k,) their distance from the model at hand in prior standard deviations; `x`
+    (g, c, k) change of the observations by one of those there; `residual` (g, c); `at_bound` if a value sits at its
+    physical bound."""
 
     members: tuple[Hypothesis, ...]
     theta: FloatArray
@@ -59,10 +57,8 @@ def refit(
     given: Model,
 ) -> Refit:  # fmt: skip
     """Fit a set by Gauss-Newton with the prior of each parameter, within its physical bounds, on a given model.
-
-    `chosen`: hypotheses of the set; `start` (k,): in prior standard deviations; `x` (g, c, k): change of the
-    observations by one of those near the start; `weight` (g, c, c): precision of each run.
-    """
+    `chosen`: hypotheses of the set; `start` (k,) in prior standard deviations; `x` (g, c, k): change of the
+    observations by one of those near the start; `weight` (g, c, c): precision of each run."""
     members = tuple(evidence.asked[m] for m in chosen)
     columns = [c for m in chosen for c in evidence.columns[m]]
     told = [(h, h.parameter(n)) for h in members for n in h.free]
@@ -133,11 +129,8 @@ def _solved(
 
 
 def estimates(found: Refit, passes: Passes, weight: FloatArray) -> list[Estimate]:
-    """Value and 95 % interval of each parameter, by the scores of the runs.
-
-    Cluster-robust variance with one run as the unit (each run's residual blown up by its own leverage), at least that
-    of the model; Student's t with the runs less the sizes that were fitted.
-    """
+    """Value and 95 % interval of each parameter: cluster-robust variance with one run as the unit, blown up by its own
+    leverage, at least that of the model; Student's t with the runs less the sizes that were fitted."""
     known = np.isfinite(found.residual)
     x, covariance, size = _solved(found, passes, weight, np.arange(len(known)))
     x = np.where(known[:, :, None], x, 0.0)

@@ -38,12 +38,9 @@ def diagnose_campaign(
     progress: Callable[[str], None] = lambda _what: None,
 ) -> Diagnosis:
     """Name the errors of the tyre and water model over a campaign, from its results; `model`: terms that are known
-    already.
-
-    A run is the independent unit throughout: each is one vector of means, its slips and resistance on water minus those
-    on dry road. It is compared with the model's expectation at the driven speed and traction. Channels are
-    `slip_slope_<wheel>` and `resistance`. `duration_s`: driving on water of all runs; `used_s`: the part that was used.
-    """
+    already. A run is the independent unit: its slips and resistance on water minus those on dry road, against the
+    model's at the driven speed and traction. Channels are `slip_slope_<wheel>` and `resistance`. `duration_s`: driving
+    on water of all runs; `used_s`: the part that was used."""
     o, given = options or Options(), model or Model()
     progress("reading the runs")
     passes = passes_of(data)
