@@ -20,9 +20,8 @@ from aqualog.diagnose.competition import Block
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.evidence import Evidence, forgiving
 from aqualog.diagnose.hypotheses import Hypothesis, residual
-from aqualog.diagnose.noise import white_noise
+from aqualog.diagnose.noise import Weighing, weighing, white_noise
 from aqualog.diagnose.shapes import ALONG, Mechanism, Shape, shapes
-from aqualog.diagnose.spectrum import Weighing, weighing
 from aqualog.diagnose.threads import beside
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Model, Term

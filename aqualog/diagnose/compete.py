@@ -12,11 +12,25 @@ import numpy.typing as npt
 
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena, products
-from aqualog.diagnose.competition import COARSE, COARSE_FORMS, Block, State, joined, placed
+from aqualog.diagnose.competition import (
+    COARSE,
+    COARSE_FORMS,
+    Block,
+    Fitted,
+    MayJoin,
+    Members,
+    Sets,
+    State,
+    first_of,
+    fitted_in,
+    joined,
+    placed,
+    ranked,
+    searched,
+)
 from aqualog.diagnose.evidence import Evidence, forgiving
-from aqualog.diagnose.sets import Fitted, MayJoin, Members, Sets, first_of, fitted_in, ranked, searched
+from aqualog.diagnose.noise import Weighing
 from aqualog.diagnose.shapes import ALONG
-from aqualog.diagnose.spectrum import Weighing
 from aqualog.diagnose.subsets import TWINS, compatible
 from aqualog.diagnose.threads import beside
 

@@ -15,7 +15,7 @@ from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import Drive
 from aqualog.diagnose.file_values import as_value, day_to_day, deviation
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
-from aqualog.diagnose.spectrum import weighing
+from aqualog.diagnose.noise import weighing
 from aqualog.model.term import Kind, Model
 
 __all__ = ["FARTHEST", "Evidence", "Forgiven", "forgiving", "make_evidence", "recentred", "tolerant"]

@@ -19,7 +19,7 @@ from aqualog.diagnose.isolate import POWER
 from aqualog.diagnose.records import SURE, Cause, Estimate, Limit, Remainder, tempered
 from aqualog.diagnose.seams import seams
 from aqualog.diagnose.search import DOUBT, Option
-from aqualog.diagnose.spline import POINTS
+from aqualog.diagnose.shapes import POINTS
 from aqualog.diagnose.verdict import Outcome
 from aqualog.diagnose.words import cause_sentence, place
 from aqualog.model.effects import EFFECTS

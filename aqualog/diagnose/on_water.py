@@ -16,7 +16,7 @@ from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import rolling_under
 from aqualog.diagnose.evidence import Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_values
-from aqualog.diagnose.spectrum import weighing
+from aqualog.diagnose.noise import weighing
 from aqualog.diagnose.threads import beside
 from aqualog.model.term import Model, Term
 

@@ -12,12 +12,11 @@ from aqualog.core.intervals import Z95
 from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import Arena
-from aqualog.diagnose.competition import COARSE
+from aqualog.diagnose.competition import COARSE, Members, fitted_in
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.records import SURE, Cause, Estimate, tempered
 from aqualog.diagnose.refit import Refit
 from aqualog.diagnose.search import DOUBT, Found, Option, sharpened
-from aqualog.diagnose.sets import Members, fitted_in
 from aqualog.diagnose.shown import repeats
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unexplained import MOST

@@ -14,7 +14,7 @@ from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import CHUNK, Arena, Part, products
 from aqualog.diagnose.evidence import FARTHEST, Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_free, with_values
-from aqualog.diagnose.spectrum import Weighing
+from aqualog.diagnose.noise import Weighing
 from aqualog.model.term import Model
 
 __all__ = ["KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "likeliest", "metric", "refit", "secants"]

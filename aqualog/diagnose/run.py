@@ -28,13 +28,12 @@ from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.grade import HILLY, Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
 from aqualog.diagnose.late import Late, found_late
-from aqualog.diagnose.next_manoeuvre import next_manoeuvre
+from aqualog.diagnose.next_manoeuvre import Rival, next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.on_water import around_water
 from aqualog.diagnose.outcome import conclude, with_causes
 from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView
 from aqualog.diagnose.refit import Refit, likeliest, metric
-from aqualog.diagnose.run_information import Rival
 from aqualog.diagnose.search import Found, Option, Tell, search, simulated
 from aqualog.diagnose.slow_force import slow_force
 from aqualog.diagnose.subsets import supported

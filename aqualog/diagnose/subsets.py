@@ -20,7 +20,7 @@ from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import stretches
 from aqualog.diagnose.evidence import Evidence, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
-from aqualog.diagnose.spectrum import weighing
+from aqualog.diagnose.noise import weighing
 from aqualog.model.effects import EFFECTS
 
 __all__ = ["TWINS", "compatible", "imitations", "supported"]

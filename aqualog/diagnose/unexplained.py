@@ -14,10 +14,9 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.arena import TOLERATED, Arena, Field
 from aqualog.diagnose.channels import CHANNELS, contrasts
 from aqualog.diagnose.compete import Fitted, Posterior
-from aqualog.diagnose.competition import Block
+from aqualog.diagnose.competition import Block, Sets, evidence_of, fitted_in
 from aqualog.diagnose.hypotheses import WORTH
 from aqualog.diagnose.records import SURE, Remainder, tempered
-from aqualog.diagnose.sets import Sets, evidence_of, fitted_in
 from aqualog.diagnose.shapes import ALONG, Mechanism
 from aqualog.diagnose.unknown_term import ALIKE as SAME
 from aqualog.diagnose.unknown_term import describe

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Generic, NamedTuple, TypeVar
 
+from aqualog.diagnose.competition import shares
 from aqualog.diagnose.records import SURE, Alternative, Cause, Verdict, tempered
-from aqualog.diagnose.sets import shares
 from aqualog.diagnose.threads import beside
 
 __all__ = ["CREDIBLE", "PLACES", "Candidate", "Causes", "Outcome", "candidates", "decided", "whole"]

@@ -7,7 +7,7 @@ from aqualog.core.notation import WHEELS
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, signatures, value_in, with_values
-from aqualog.diagnose.spectrum import weighing
+from aqualog.diagnose.noise import weighing
 from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import STEP_S, setup_along

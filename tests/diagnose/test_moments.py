@@ -7,9 +7,9 @@ import pytest
 
 from aqualog.diagnose.arena import Part, arena_of, by_drives, competing
 from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.elements import begun, intervals, moments, trapezoid
 from aqualog.diagnose.hypotheses import hypotheses, residual, signatures
 from aqualog.diagnose.search import simulated
-from aqualog.diagnose.steps import begun, intervals, moments, trapezoid
 from aqualog.model.term import Model
 from tests.diagnose.test_drive import CAR, NOISY, plain, signals, term
 

@@ -8,19 +8,16 @@ import pytest
 
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import KEYS, Vehicle
-from aqualog.diagnose import run_information
 from aqualog.diagnose.arena import make_arena
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.drive import led_by, prepare
 from aqualog.diagnose.hypotheses import hypotheses, residual
 from aqualog.diagnose.manoeuvres import KMH, RUNS, programme, turned
-from aqualog.diagnose.next_manoeuvre import _recommended, next_manoeuvre
-from aqualog.diagnose.noise import fit_noise
+from aqualog.diagnose.next_manoeuvre import Rival, _recommended, _signatures, next_manoeuvre
+from aqualog.diagnose.noise import fit_noise, weighing
 from aqualog.diagnose.refit import metric, refit
-from aqualog.diagnose.run_information import Rival
 from aqualog.diagnose.search import simulated
-from aqualog.diagnose.spectrum import weighing
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import PERFECT
 from aqualog.model.log import as_signals
@@ -149,7 +146,7 @@ def test_on_the_way_back_the_wind_has_the_other_sign_and_drag_has_not(wind):
     there, back = (next(r for r in RUNS if r.opposite is x and r.water is None) for x in (False, True))
     asked = [h for h in evidence.asked if h.key in ("head_wind", "aero_drag")]
     base = residual(drive, Model())
-    ways = [run_information._signatures(drive, Model(), asked, base, r, each=False) for r in (there, back)]
+    ways = [_signatures(drive, Model(), asked, base, r, each=False) for r in (there, back)]
     signs = {h.key: float(np.sum(a * b) / np.sum(a * a)) for h, a, b in zip(asked, *ways, strict=True)}
     assert signs == {"head_wind": pytest.approx(-1.0), "aero_drag": pytest.approx(1.0)}
 

@@ -8,13 +8,13 @@ import pytest
 from aqualog.diagnose import search
 from aqualog.diagnose.arena import arena_of, known_only
 from aqualog.diagnose.compete import compete
+from aqualog.diagnose.competition import fitted_in
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.evidence import FARTHEST
 from aqualog.diagnose.hypotheses import Hypothesis, residual, with_values
 from aqualog.diagnose.hypotheses import simulated as shown
 from aqualog.diagnose.refit import KNOWN, likeliest, metric, refit, secants
 from aqualog.diagnose.search import simulated
-from aqualog.diagnose.sets import fitted_in
 from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from aqualog.diagnose.arena import Field
-from aqualog.diagnose.competition import Block
+from aqualog.diagnose.competition import Block, evidence_of, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.hypotheses import Hypothesis
-from aqualog.diagnose.sets import evidence_of, first_of, fitted_in, ranked, searched
 from aqualog.diagnose.unexplained import clear_forms
 from aqualog.model.effects import EFFECTS
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from aqualog.diagnose.spectrum import weighing
+from aqualog.diagnose.noise import weighing
 from tests.diagnose.test_noise import coloured
 
 N = 3000

@@ -9,20 +9,18 @@ import polars as pl
 import pytest
 
 from aqualog.core.vehicle import Vehicle
-from aqualog.diagnose import run, spectrum, unexplained
+from aqualog.diagnose import noise, run, unexplained
 from aqualog.diagnose.arena import arena_of
 from aqualog.diagnose.channels import block_means
 from aqualog.diagnose.compete import compete
-from aqualog.diagnose.competition import Block, joined, packed, scores
+from aqualog.diagnose.competition import Block, Fitted, fitted_in, joined, packed, scores
 from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.evidence import make_evidence
 from aqualog.diagnose.hypotheses import hypotheses
-from aqualog.diagnose.noise import white_noise
+from aqualog.diagnose.noise import weighing, white_noise
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
-from aqualog.diagnose.sets import Fitted, fitted_in
 from aqualog.diagnose.shapes import MECHANISMS
-from aqualog.diagnose.spectrum import weighing
 from aqualog.diagnose.unexplained import LEAST, unknown_forms
 from aqualog.diagnose.unknown_term import as_term
 from aqualog.model.scenario import Scenario
@@ -98,7 +96,7 @@ def test_evidence_is_that_of_the_dense_normal_distribution():
 
 def test_gains_of_noise_are_those_of_white_noise_once_it_is_weighed(monkeypatch):
     """By the spectrum alone, after noise without colour: columns within the band would gain many times that."""
-    monkeypatch.setattr(spectrum, "fit_noise", white_noise)
+    monkeypatch.setattr(noise, "fit_noise", white_noise)
     gains, every = [], np.ones(N, dtype=bool)
     for seed in range(12):
         rng = np.random.default_rng([5, seed])

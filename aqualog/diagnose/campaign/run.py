@@ -11,11 +11,9 @@ from aqualog.campaign.results import CampaignData
 from aqualog.core.records import FloatArray
 from aqualog.diagnose import isolate
 from aqualog.diagnose.campaign.advice import advice
-from aqualog.diagnose.campaign.catalogue import hypotheses, untested
-from aqualog.diagnose.campaign.compete import Found, Option, compete
-from aqualog.diagnose.campaign.observe import passes_of
+from aqualog.diagnose.campaign.compete import Found, Option, compete, hypotheses, untested
 from aqualog.diagnose.campaign.outcome import conclude
-from aqualog.diagnose.campaign.passes import RESISTANCE, Passes, doubted, steady
+from aqualog.diagnose.campaign.passes import RESISTANCE, Passes, doubted, passes_of, steady
 from aqualog.diagnose.campaign.refit import settled
 from aqualog.diagnose.outcome import with_causes
 from aqualog.diagnose.records import Diagnosis, Gain, ResidualView
