@@ -81,50 +81,37 @@ class Drive:
 
 
 def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: bool = False) -> Drive:
-    """Signals of one drive as input and measurement.
-
-    Raises
-    ------
-    SignalError
-        If the log has neither velocity nor four wheel speeds, or nothing to compare, or is too short or too slow.
+    """Signals of one drive as input and measurement; SignalError if the log has neither velocity nor four wheel speeds,
+    or nothing to compare, or is too short or too slow.
 
     Left out, with a second on either side: standstill and creeping, gaps, strong cornering, braking where the brakes'
     torque is not in the log, a frozen accelerometer; with 0.1 s: jumps of the torque. And where a wheel may float,
     unless it is judged there, too (`judges_afloat`).
     """
     present = frozenset(s for s in signals.symbols if _is_measured(signals, s))
-    if signals.frame.height * signals.dt < inputs.LEAST_S:
+    dt, n = signals.dt, signals.frame.height
+    if n * dt < inputs.LEAST_S:
+        least = f"{inputs.LEAST_S:.0f} s at the least"
+        raise SignalError(f"{n * dt:.0f} s of drive", where=name, expected=least, hint="a longer drive")
+    if dt * LEAST_RATE_HZ > 1.001:
         raise SignalError(
-            f"{signals.frame.height * signals.dt:.0f} s of drive", where=name,
-            expected=f"{inputs.LEAST_S:.0f} s at the least", hint="a longer drive",
-        )  # fmt: skip
-    if signals.dt * LEAST_RATE_HZ > 1.001:
-        raise SignalError(
-            f"signals at {1.0 / signals.dt:.3g} Hz", where=name, expected=f"{LEAST_RATE_HZ:g} Hz or more",
+            f"signals at {1.0 / dt:.3g} Hz", where=name, expected=f"{LEAST_RATE_HZ:g} Hz or more",
             hint="the log before it was thinned; check the unit of its time and --rate",
         )  # fmt: skip
     channels = channels_of(present, vehicle)
     if not channels:
-        raise SignalError(
-            "nothing to compare", where=name, expected="accelerometer or wheel speeds, and a velocity",
-            hint=MAP_HINT,
-        )  # fmt: skip
+        lacks = "accelerometer or wheel speeds, and a velocity"
+        raise SignalError("nothing to compare", where=name, expected=lacks, hint=MAP_HINT)
     vehicle = _as_known(vehicle, signals)
     columns = {s: signals.array(s) for s in present}
-    dt, n = signals.dt, signals.frame.height
     notes = _silent(signals, present)
-    velocity = _velocity(columns, vehicle, dt, present)
-    gaps = np.zeros(n, dtype=bool)
-    v = _bridged(velocity, dt, gaps)
+    v, bad = _bridged(_velocity(columns, vehicle, dt, present), dt)
     torqued = "force_balance" in channels
-    needed = ["a_x"] if "a_x" in present else []
-    needed += [f"omega_{w}" for w in WHEELS if f"omega_{w}" in present]
-    filled: dict[str, FloatArray] = {}
-    for s in sorted(present):
-        own = np.zeros(n, dtype=bool)
-        filled[s] = _bridged(columns[s], dt, own)
-        if s in needed or s == "v_x" or (torqued and s.startswith("torque_")):
-            gaps |= own
+    bridged = {s: _bridged(columns[s], dt) for s in sorted(present)}
+    filled = {s: x for s, (x, _) in bridged.items()}
+    needed = ("a_x", "v_x", "omega_", *(("torque_",) if torqued else ()))
+    for gaps in (own for s, (_, own) in bridged.items() if s.startswith(needed)):
+        bad |= gaps
     if torqued:
         # signals have the file's torque gain already: it is applied on reading
         logged = np.array([filled.get(f"torque_{w}", np.zeros(n)) for w in WHEELS])
@@ -145,7 +132,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     )
     course = _without_lag(measured, led := follow(vehicle, measured, Model()))
     floats = floating(filled, v, vehicle, course)
-    bad = gaps | (v < inputs.V_MIN)
+    bad |= v < inputs.V_MIN
     if not judges_afloat:
         bad |= floats
         if _slides(led, vehicle).any():
@@ -253,18 +240,14 @@ def _velocity(columns: Mapping[str, FloatArray], vehicle: Vehicle, dt: float, pr
     return np.asarray(np.mean([columns[f"omega_{w}"] * vehicle.r_e(w) for w in free], axis=0))
 
 
-def _bridged(x: FloatArray, dt: float, gaps: BoolArray) -> FloatArray:
-    """Short gaps by straight lines; samples in long ones are marked."""
+def _bridged(x: FloatArray, dt: float) -> tuple[FloatArray, BoolArray]:
+    """A signal with its gaps bridged by straight lines, and the samples in long ones."""
     good = np.isfinite(x)
-    if good.all():
-        return x
-    if not good.any():
-        gaps[:] = True
-        return np.zeros_like(x)
+    if good.all() or not good.any():
+        return np.where(good, x, 0.0), ~good
     where = np.flatnonzero(good)
     is_long = np.diff(where, prepend=-1, append=2 * x.size) * dt > GAP_S  # of the gap before each, and of the last one
-    gaps |= ~good & is_long[np.cumsum(good)]
-    return np.interp(np.arange(x.size), where, x[where])
+    return np.interp(np.arange(x.size), where, x[where]), ~good & is_long[np.cumsum(good)]
 
 
 def _lanes(columns: Mapping[str, FloatArray], dt: float) -> tuple[Lane, ...]:

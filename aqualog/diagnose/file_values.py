@@ -81,9 +81,8 @@ def not_calibrated(vehicle: Vehicle, channels: Collection[str]) -> str:
     keys = [k for k in calibrated_enough(vehicle) if needs.get(k, "slip") in " ".join(channels)]
     if not keys:
         return ""
-    known = (
-        "" if provenance_of(vehicle, "mass").source == "measured" else ", best with the weighed mass (--fix mass=...)"
-    )
+    is_weighed = provenance_of(vehicle, "mass").source == "measured"
+    known = "" if is_weighed else ", best with the weighed mass (--fix mass=...)"
     doubt = f"{listed(keys)} {'is a guess' if len(keys) == 1 else 'are guesses'}"
     if not vehicle.provenance:
         doubt = "it does not say where its values come from, so they count as exact"

@@ -75,6 +75,11 @@ class _Wheel(NamedTuple):
     weight: FloatArray
     turns: FloatArray
 
+    @property
+    def place_of(self) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
+        """Bin of the angle that each sample is in. (m,)"""
+        return np.asarray(np.floor((self.turns - self.turns[0]) * BINS), dtype=np.intp)
+
 
 class _Sum(NamedTuple):
     """Sums over blocks of turns: weight (b,), transforms (b, j) at the orders `offset` (j,) beside the whole one,
@@ -195,13 +200,13 @@ def _tested(wheel: _Wheel, order: int, slack: float) -> PerTurn | str:
 
 def _best(part: _Wheel, order: int, gain: FloatArray, slack: float) -> _Fit | str:
     """The surest of the sums over the whole drive and over blocks of it, at the surest order within `slack`."""
-    place_of = np.floor((part.turns - part.turns[0]) * BINS).astype(np.intp)
+    place_of = part.place_of
     turns = int(place_of[-1] // BINS) + 1
     filled = np.unique(place_of // BINS).size
     if filled < LEAST_TURNS:
         return f"{filled} turns at usable speeds, {LEAST_TURNS} are needed"
     lengths = (turns, *(b for b in BLOCKS if 2 * b <= turns))
-    sums = (_summed(part, order, gain, place_of, length, FINER if slack else 1) for length in lengths)
+    sums = (_summed(part, order, gain, length, FINER if slack else 1) for length in lengths)
     fits = [f for f in (_fitted(s, order * slack) for s in sums) if f is not None]
     if not fits:
         return "too few turns"
@@ -218,11 +223,9 @@ def _lossless(fits: Sequence[_Fit]) -> _Fit:
     return fits[-1]
 
 
-def _summed(
-    part: _Wheel, order: int, gain: FloatArray, place_of: np.ndarray[tuple[int], np.dtype[np.intp]], length: int,
-    finer: int,
-) -> _Sum:  # fmt: skip
+def _summed(part: _Wheel, order: int, gain: FloatArray, length: int, finer: int) -> _Sum:
     """Sums over blocks of `length` turns; the transform over the bins of a block gives the orders beside the whole."""
+    place_of = part.place_of
     blocks = int(place_of[-1] // (BINS * length)) + 1
     size = blocks * length * BINS
     w = part.weight * gain
@@ -266,8 +269,7 @@ def _fitted(sums: _Sum, slack: float) -> _Fit | None:
 
 def _speed_dependence(part: _Wheel, order: int, gain: FloatArray, best: _Fit) -> tuple[str, float]:
     """How the amplitude differs between thirds of the drive by speed, and the largest; empty if it does not."""
-    place_of = np.floor((part.turns - part.turns[0]) * BINS).astype(np.intp)
-    sums = _summed(part, order, gain, place_of, BLOCKS[-1], best.sums.finer)
+    sums = _summed(part, order, gain, BLOCKS[-1], best.sums.finer)
     at = int(np.argmin(np.abs(sums.offset - best.sums.offset[best.at])))
     by_speed = np.argsort(sums.speed, kind="stable")
     share = np.cumsum(sums.weight[by_speed]) / sums.weight.sum()

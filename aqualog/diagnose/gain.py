@@ -42,14 +42,9 @@ class LogScoreGain(NamedTuple):
 
 
 def measured_gain(
-    drives: Sequence[Drive],
-    models: tuple[Model, Model, Model],
-    noise: Noise,
-    *,
-    seed: int,
-    in_sample: bool,
+    drives: Sequence[Drive], models: tuple[Model, Model, Model], noise: Noise, *, seed: int, in_sample: bool,
     consequences: tuple[Consequence, ...] = (),
-) -> Gain:
+) -> Gain:  # fmt: skip
     """Error and log score of models on drives with the channels that the noise was fitted on.
 
     `models`: as the file has it, the same at the car's likeliest values, and extended at its likeliest values. Errors
@@ -151,15 +146,13 @@ def scope(
     in_sample: bool,
 ) -> tuple[str, ...]:  # fmt: skip
     """Notes on what the interval holds for, on which drives the model is worse, and whether there is no gain."""
-    notes = []
-    if in_sample:
-        notes.append("the gain is on the drives that the model was fitted to; it is no evidence for other drives")
+    own = "the gain is on the drives that the model was fitted to; it is no evidence for other drives"
+    reach = "the interval of the log score holds for the drives named; they are too few for a wider statement"
     if math.isnan(won.low):
-        notes.append(f"no interval: the log score has a single block of {BLOCK_S:g} s")
+        reach = f"no interval: the log score has a single block of {BLOCK_S:g} s"
     elif _drives_are_units(after):
-        notes.append(f"the interval of the log score holds for {len(names)} other drives of this kind")
-    else:
-        notes.append("the interval of the log score holds for the drives named; they are too few for a wider statement")
+        reach = f"the interval of the log score holds for {len(names)} other drives of this kind"
+    notes = [own, reach] if in_sample else [reach]
     worse = [n for n, x, y in zip(names, before, after, strict=True) if float((y - x).sum()) < 0.0]
     if worse and len(names) > 1:
         notes.append(f"worse with the model: {', '.join(worse)}")

@@ -32,6 +32,11 @@ WORTH = 2.0  # tolerances
 # over the change of the other has a standard deviation of 0.02 (D): pitching, filters, hills
 OF_CHANGES, _OF_CHANGES = 0.02, ("velocity_scale", "accelerometer_gain")
 POWER_OF_SPEED = 4.0  # of the speed of full aquaplaning, with which the lost contact goes
+_TURNING = {"a_y", "yaw_rate", "steer_angle"}
+# signals that a place needs
+_SIGNALS: dict[str | None, set[str]] = {
+    "a_y": _TURNING, "yaw_rate": _TURNING, "v_x": {"v_x"}, "a_x": {"a_x"}, "omega": {f"omega_{w}" for w in WHEELS},
+}  # fmt: skip
 ROUGH_S = 1e-2  # [s] step that is enough for differences of simulations on dry road
 MOST_APART = 8  # drives that may each have an effect of their own
 MOST_LANES = 16  # that differ from each other; of more lanes, every 16th have a deviation in common
@@ -133,7 +138,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         free = tuple(p.name for p in effect.parameters[: effect.drive.count])
         wheels_of = WHEELS if effect.drive.by_wheel else ()
         places = effect.drive.places or ((*wheels_of, *AXLES, None) if "fl" in effect.places else (None,))
-        asked = [w for w in places if _has_signal(w, present, torque=torque)]
+        asked = [w for w in places if (torque if w in ("torque", "torque_fl") else _SIGNALS.get(w, set()) <= present)]
         if not asked:
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
         if "steer_angle" in present & set(effect.places):
@@ -166,18 +171,6 @@ def room_of(effect: Effect, where: str | None, car: Vehicle, *, wheels: bool) ->
     if effect.name == "contact_loss" and fitted is not None and fitted.source in ("calibrated", "measured"):
         return max(POWER_OF_SPEED * fitted.sd / fitted.value, TOLERANCE * effect.parameters[0].smallest)
     return OF_CHANGES if not wheels and effect.name in _OF_CHANGES and where in ("v_x", "a_x") else None
-
-
-def _has_signal(where: str | None, present: frozenset[str], *, torque: bool) -> bool:
-    if where in ("a_y", "yaw_rate"):
-        return {"a_y", "yaw_rate", "steer_angle"} <= present
-    if where in ("v_x", "a_x"):
-        return where in present
-    if where == "omega":
-        return all(f"omega_{w}" in present for w in WHEELS)
-    if where in ("torque", "torque_fl"):
-        return torque
-    return True
 
 
 def with_values(model: Model, found: Sequence[tuple[Hypothesis, Mapping[str, float]]]) -> Model:

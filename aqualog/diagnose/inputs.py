@@ -111,11 +111,9 @@ def _ends(x: FloatArray, dt: float) -> tuple[float, float]:
     """Where a signal begins and ends, by lines through its first and last seconds: one noisy sample would be a jump."""
     k = min(max(2, round(END_S / dt)), x.size)
     at = np.arange(k) - 0.5 * (k - 1)
-    out = []
-    for part in (x[:k], x[::-1][:k]):
-        slope = float(at @ part) / float(at @ at)
-        out.append(float(part.mean()) + slope * float(at[0]))
-    return out[0], out[1]
+    both = (x[:k], x[::-1][:k])
+    begin, end = (float(y.mean()) + float(at @ y) / float(at @ at) * float(at[0]) for y in both)
+    return begin, end
 
 
 def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:

@@ -72,14 +72,9 @@ class Options:
 
 
 def diagnose(
-    drives: Sequence[tuple[str, Signals]],
-    vehicle: Vehicle,
-    *,
-    model: Model | None = None,
-    holdout: Sequence[tuple[str, Signals]] = (),
-    options: Options | None = None,
-    progress: Tell | None = None,
-) -> Diagnosis:
+    drives: Sequence[tuple[str, Signals]], vehicle: Vehicle, *, model: Model | None = None,
+    holdout: Sequence[tuple[str, Signals]] = (), options: Options | None = None, progress: Tell | None = None,
+) -> Diagnosis:  # fmt: skip
     """Errors of the model on drives, each with its name, with their causes. The same for the same input and seed.
 
     The drives were measured with the same car in the same state; each has a noise of its own. `model`: terms that are

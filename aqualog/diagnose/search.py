@@ -338,15 +338,11 @@ def _doubtful(arena: Arena, found: Refit) -> list[FloatArray]:
     for p in arena.parts:
         size += ((off[:, None, None] * found.signatures[p.drive][..., p.at][..., p.mask]) ** 2).sum(axis=-1)
         noise += (found.residuals[p.drive][:, p.at][..., p.mask] ** 2).sum(axis=-1)
-    units = [CHANNELS[c].unit for c in channels]
-    every = np.ndindex(off.size, count, count)
-    large = [(k, c, to) for k, c, to in every if units[c] == units[to] and size[k, c] > noise[to]]
-    out = []
-    for own in found.signatures:
-        each = np.zeros((len(large), *own.shape[1:]))
-        for i, (k, c, to) in enumerate(large):
-            each[i, to] = off[k] * own[k, c]
-        out.append(each)
+    units = np.array([CHANNELS[c].unit for c in channels])
+    k, c, to = np.nonzero((units[:, None] == units) & (size[:, :, None] > noise))
+    out = [np.zeros((k.size, *own.shape[1:])) for own in found.signatures]
+    for each, own in zip(out, found.signatures, strict=True):
+        each[np.arange(k.size), to] = off[k, None] * own[k, c]
     return out
 
 

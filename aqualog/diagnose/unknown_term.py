@@ -83,7 +83,7 @@ def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = 
     similar effects."""
     title = _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title if r.channel in CHANNELS else r.channel)
     title = f"{title[:1].lower()}{title[1:]}"
-    how = r.manner or f"goes with {' and '.join(map(_title, r.depends_on))}"
+    how = r.manner or f"goes with {_over(r.depends_on)}"
     text = f"Unexplained: {mechanism.title} {how} (probability {r.probability:.2f}"
     text += f"; {r.share:.0%} of the variance of the {title}"
     sure = np.isfinite(r.high) & ((r.low > 0.0) | (r.high < 0.0))  # a band without an end says no size
@@ -92,7 +92,7 @@ def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = 
         there = ", ".join(f"{v:.4g} {COORDINATES[n].unit}" for n, v in zip(r.depends_on, r.x[at], strict=True))
         text += f"; {_size(mechanism, float(r.f[at]))} at {there}"
     text += ")."
-    for alike in ([m.title for m in instead], [f"one that goes with {_title(n)}" for n in r.proxies]):
+    for alike in ([m.title for m in instead], [f"one that goes with {_over([n])}" for n in r.proxies]):
         text += f" It cannot be distinguished from {listed(alike)} here." if alike else ""
     # what comes again at equal ways does not at equal times, unless the speed never changes: then both are likely
     if {"t", "position"} & set(r.depends_on) and not r.manner.startswith(("in waves", "for ")):
@@ -115,9 +115,9 @@ def short_form(remainder: Remainder) -> str:
     """`a force on the car that goes with speed`, `a force on the car from 66 s to 145 s`."""
     elsewhere = "" if remainder.manner else remainder.channel
     title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), elsewhere)
-    how = remainder.manner or f"that goes with {' and '.join(map(_title, remainder.depends_on))}"
+    how = remainder.manner or f"that goes with {_over(remainder.depends_on)}"
     return f"{title} {how}".strip()
 
 
-def _title(name: str) -> str:
-    return COORDINATES[name].title
+def _over(names: Sequence[str]) -> str:
+    return " and ".join(COORDINATES[n].title for n in names)

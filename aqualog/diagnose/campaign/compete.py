@@ -76,14 +76,12 @@ def signatures(passes: Passes, model: Model, asked: Sequence[Hypothesis], expect
     """Change (g, c, k) of the observations by one prior standard deviation of each parameter, from differences of the
     expectation about a model, whose own is `expected` (g, c)."""
     columns = []
-    for h in asked:
-        for n in h.free:
-            p, at = h.parameter(n), value_in(model, h, n)
-            ends = [min(max(at + s * STEP * p.sigma, p.low), p.high) for s in (-1.0, 1.0)]
-            low, high = (
-                expected if x == at else expected_values(passes, with_values(model, [(h, {n: x})]))[0] for x in ends
-            )
-            columns.append((high - low) * (p.sigma / (ends[1] - ends[0])))
+    for h, n in [(own, n) for own in asked for n in own.free]:
+        p, at = h.parameter(n), value_in(model, h, n)
+        ends = [min(max(at + s * STEP * p.sigma, p.low), p.high) for s in (-1.0, 1.0)]
+        models = (with_values(model, [(h, {n: x})]) for x in ends)
+        low, high = (expected if x == at else expected_values(passes, m)[0] for x, m in zip(ends, models, strict=True))
+        columns.append((high - low) * (p.sigma / (ends[1] - ends[0])))
     return np.nan_to_num(np.stack(columns, axis=-1))
 
 
@@ -204,31 +202,25 @@ def _forms(ring: _Ring, stand: _Stand, seed: int) -> tuple[tuple[Remainder, ...]
         new = tuple(m for m in sets.best if ring.blocks[m].kind == "shape")
         if new == after:
             break
-        after = new
-        drawn = [
-            ring.functions[:, :, [c - k for c in b.columns]] @ np.linalg.cholesky(b.prior)
-            for b in (ring.blocks[m] for m in new)
-        ]
+        after, own = new, [ring.blocks[m] for m in new]
+        drawn = [ring.functions[:, :, [c - k for c in b.columns]] @ np.linalg.cholesky(b.prior) for b in own]
         x = np.concatenate([stand.x, *drawn], axis=-1)
-        wider = fit(stand.best.residual, x, stand.road, passes.nuisances, stand.scatter)
-        stand = replace(stand, scatter=wider)
+        stand = replace(stand, scatter=fit(stand.best.residual, x, stand.road, passes.nuisances, stand.scatter))
     out = []
     linear = fitted_in(ring.blocks, gram, sets.best)
     for c in clear_forms(ring, sets, gram):
-        own = [i for m in c.own for i in ring.blocks[m].columns]
-        form = ring.functions[:, :, [i - k for i in own]] @ linear.mean[[linear.columns.index(i) for i in own]]
-        name = ring.mechanism(c.first).name
+        at, name = [i for m in c.own for i in ring.blocks[m].columns], ring.mechanism(c.first).name
+        form = ring.functions[:, :, [i - k for i in at]] @ linear.mean[[linear.columns.index(i) for i in at]]
         # share of the variance, where the mechanism acts, that the form explains
-        own = _channels(passes.names)[name]
-        share = max(1.0 - float(np.nanvar((stand.y - form)[:, own]) / np.nanvar(stand.y[:, own])), 0.0)
+        there = _channels(passes.names)[name]
+        share = max(1.0 - float(np.nanvar((stand.y - form)[:, there]) / np.nanvar(stand.y[:, there])), 0.0)
         out.append(described(ring, sets, gram, linear, c, name, share, seed))
     return tuple(out), stand
 
 
 def _options(ring: _Ring, stand: _Stand, nothing: Refit) -> tuple[Option, ...]:
     """The sets that hold most of the posterior, refitted, with the evidence about their own values."""
-    gram = stand.gram(ring.passes)
-    sets = ring.sets(ring.known, gram)
+    sets = ring.sets(ring.known, gram := stand.gram(ring.passes))
     enough = 1 + int(np.searchsorted(np.cumsum(sets.probability), COVERED))
     chosen = [members for members, _ in sets.sets[: min(enough, REFITTED)] if members]
     refits = [(members, _refitted(ring, stand, members, gram)) for members in chosen]

@@ -29,12 +29,9 @@ LEAST_RUNS = 12
 
 
 def diagnose_campaign(
-    data: CampaignData,
-    model: Model | None = None,
-    *,
-    options: Options | None = None,
+    data: CampaignData, model: Model | None = None, *, options: Options | None = None,
     progress: Callable[[str], None] = lambda _what: None,
-) -> Diagnosis:
+) -> Diagnosis:  # fmt: skip
     """Name the errors of the tyre and water model over a campaign, from its results; `model`: terms that are known
     already. A run is the independent unit: its slips and resistance on water minus those on dry road, against the
     model's at the driven speed and traction. Channels are `slip_slope_<wheel>` and `resistance`. `duration_s`: driving
