@@ -15,9 +15,8 @@ from aqualog.diagnose.arena import Arena
 from aqualog.diagnose.competition import COARSE, Members, fitted_in
 from aqualog.diagnose.hypotheses import Hypothesis, value_in, with_values
 from aqualog.diagnose.records import SURE, Cause, Estimate, tempered
-from aqualog.diagnose.refit import Refit
+from aqualog.diagnose.refit import Refit, repeats
 from aqualog.diagnose.search import DOUBT, Found, Option, sharpened
-from aqualog.diagnose.shown import repeats
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unexplained import MOST
 from aqualog.diagnose.verdict import CREDIBLE, PLACES, Candidate, Causes, Outcome, candidates, decided, whole

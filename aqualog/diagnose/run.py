@@ -15,13 +15,12 @@ from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
 from aqualog.diagnose.agreement import agreements, contradicted, widened
-from aqualog.diagnose.any_effect import SURROGATES
 from aqualog.diagnose.arena import by_drives, competing
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.drive import Drive, led_by, prepare
-from aqualog.diagnose.evidence import Evidence, recentred, tolerant
+from aqualog.diagnose.evidence import SURROGATES, Evidence, recentred, tolerant
 from aqualog.diagnose.faster import faster, joined, with_rings
 from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
@@ -35,9 +34,9 @@ from aqualog.diagnose.outcome import conclude, with_causes
 from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView
 from aqualog.diagnose.refit import Refit, likeliest, metric
 from aqualog.diagnose.search import Found, Option, Tell, search, simulated
-from aqualog.diagnose.slow_force import slow_force
 from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.threads import beside
+from aqualog.diagnose.unexplained import slow_force
 from aqualog.diagnose.unknown_term import as_term, short_form
 from aqualog.diagnose.verdict import Outcome
 from aqualog.diagnose.words import listed, term_words, verdict_sentence

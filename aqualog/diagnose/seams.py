@@ -14,7 +14,7 @@ import numpy as np
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
-from aqualog.diagnose.any_effect import gumbel_p
+from aqualog.diagnose.evidence import gumbel_p
 from aqualog.diagnose.inputs import smooth
 
 __all__ = ["SEAM_LEVEL", "Seam", "seams"]

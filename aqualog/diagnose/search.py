@@ -14,19 +14,17 @@ import numpy as np
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import Arena, known_only, make_arena
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.compete import Members, Posterior, begin, compete
 from aqualog.diagnose.competition import COARSE, fitted_in, joined, placed
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import moments, with_elements
-from aqualog.diagnose.evidence import Evidence, forgiving, make_evidence, tolerant
+from aqualog.diagnose.evidence import Calibration, Evidence, calibrate, forgiving, make_evidence, significance, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_free
 from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
-from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit, secants
-from aqualog.diagnose.shown import silent
+from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit, secants, silent
 from aqualog.diagnose.subsets import compatible, imitations
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unexplained import unknown_forms

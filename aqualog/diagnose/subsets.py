@@ -15,10 +15,9 @@ from itertools import combinations
 import numpy as np
 
 from aqualog.core.notation import AXLES, WHEELS
-from aqualog.diagnose.any_effect import gains_of
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import stretches
-from aqualog.diagnose.evidence import Evidence, tolerant
+from aqualog.diagnose.evidence import Evidence, gains_of, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import weighing
 from aqualog.model.effects import EFFECTS

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aqualog.diagnose.any_effect import SURROGATES, calibrate, gumbel_p, significance
-from aqualog.diagnose.evidence import tolerant
+from aqualog.diagnose.evidence import SURROGATES, calibrate, gumbel_p, significance, tolerant
 from tests.diagnose.test_noise import first_order
 from tests.diagnose.test_subsets import ASKED, bench_of, made, plain, waves
 

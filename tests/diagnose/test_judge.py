@@ -8,8 +8,7 @@ import pytest
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.records import tempered
-from aqualog.diagnose.refit import Refit
-from aqualog.diagnose.shown import repeats, silent
+from aqualog.diagnose.refit import Refit, repeats, silent
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 from tests.diagnose.test_unexplained import arena, slow

@@ -12,8 +12,8 @@ from aqualog.campaign.measure import measure
 from aqualog.core.intervals import chi2_log_p
 from aqualog.diagnose.campaign import diagnose_campaign, outcome, refit
 from aqualog.diagnose.campaign.expect import Driven, respond
-from aqualog.diagnose.campaign.noise import fit
 from aqualog.diagnose.campaign.passes import expected_values, passes_of
+from aqualog.diagnose.campaign.refit import fit
 from aqualog.diagnose.run import Options
 from aqualog.diagnose.search import DOUBT
 from aqualog.diagnose.unexplained import MOST

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from aqualog.diagnose import slow_force as module
-from aqualog.diagnose.slow_force import slow_force
+from aqualog.diagnose import unexplained as module
+from aqualog.diagnose.unexplained import slow_force
 from aqualog.model.term import Model
 
 MASS = 1600.0

@@ -7,11 +7,10 @@ import pytest
 
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose import search
-from aqualog.diagnose.any_effect import gains_of
 from aqualog.diagnose.arena import arena_of
 from aqualog.diagnose.compete import compete
 from aqualog.diagnose.competition import fitted_in
-from aqualog.diagnose.evidence import make_evidence, tolerant
+from aqualog.diagnose.evidence import gains_of, make_evidence, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.subsets import compatible
 from aqualog.model.effects import EFFECTS

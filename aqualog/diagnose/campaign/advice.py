@@ -12,8 +12,8 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.campaign.compete import Option
 from aqualog.diagnose.campaign.expect import Driven, respond
-from aqualog.diagnose.campaign.noise import Fit
 from aqualog.diagnose.campaign.passes import CONTACT_MIN, LOST_MAX, RESISTANCE, Passes
+from aqualog.diagnose.campaign.refit import Fit
 from aqualog.diagnose.records import Manoeuvre
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import assemble

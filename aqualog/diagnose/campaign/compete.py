@@ -10,14 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.records import FloatArray
-from aqualog.diagnose.any_effect import Calibration, calibrate, significance
 from aqualog.diagnose.arena import Field, blocks_of
-from aqualog.diagnose.campaign.noise import Fit, fit, inner
 from aqualog.diagnose.campaign.passes import RESISTANCE, Passes, expected_values
-from aqualog.diagnose.campaign.refit import Refit, refit
+from aqualog.diagnose.campaign.refit import Fit, Refit, fit, inner, refit
 from aqualog.diagnose.compete import rule
 from aqualog.diagnose.competition import COARSE, Block, Members, Sets, fitted_in, joined, placed, ranked, searched
-from aqualog.diagnose.evidence import Evidence
+from aqualog.diagnose.evidence import Calibration, Evidence, calibrate, significance
 from aqualog.diagnose.hypotheses import WORTH, Hypothesis, value_in, with_values
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.run import Options

@@ -98,7 +98,7 @@ def question_of(told: Sequence[Told]) -> Question:
 
 def doubted(passes: Passes, base: Model) -> Passes:
     """The same runs with columns before the free ones, for what the expectation is off by in all runs alike
-    (`noise.prior_of`).
+    (`refit.prior_of`).
 
     The steady expectation is accurate to `STEADY`, of slips and resistance each, friction to `FRICTION`, depths to
     `LABEL`. Lost contact and drag of an axle follow a law that is known as on single drives, or as well as the vehicle
