@@ -1,22 +1,27 @@
-"""What a log shows faster than the blocks of the search, joined to the verdict: uneven tone rings, seams of the log."""
+"""What a log shows beside the residuals of the search, joined to the verdict: uneven tone rings, seams of the log, and
+signals that come so late that the competition did not find it. Their lags are known to hundredths of a second from
+curves and braking, which the force balance leaves out."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.checks.delays import delays_in
+from aqualog.checks.doubts import Doubt
 from aqualog.core.intervals import Z95
 from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.full_rate import LEVEL, Kind, PerTurn, per_turn, wheel_columns
+from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.isolate import POWER
-from aqualog.diagnose.records import SURE, Cause, Estimate, Limit, Remainder, tempered
+from aqualog.diagnose.records import MOST, SURE, Cause, Estimate, Limit, Remainder, Verdict, tempered
 from aqualog.diagnose.seams import seams
 from aqualog.diagnose.search import DOUBT, Option
 from aqualog.diagnose.shapes import POINTS
@@ -26,8 +31,8 @@ from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 
 __all__ = [
-    "Faster", "faster", "joined", "limits", "odd_wheels", "pooled", "remarks", "to_causes", "why_untested",
-    "with_rings", "without_known",
+    "Faster", "Late", "faster", "found_late", "joined", "limits", "odd_wheels", "pooled", "remarks", "to_causes",
+    "why_untested", "with_rings", "without_known",
 ]  # fmt: skip
 
 SHOWN = 5e-4  # smallest amplitude that is worth a remark
@@ -38,6 +43,10 @@ ODD, TIMES = 1e-3, 3.0
 _OFTEN = {1: "once", 2: "twice", 3: "3 times"}  # by the order
 _RING = EFFECTS["tone_ring"]
 _AMPLITUDE = _RING.parameters[0]
+HALF_S = 0.15  # [s] of the 95 % interval: by so much filters of three measured cars differ (D)
+DOUBTED = 0.5  # of a probability beside a signal that comes late, which no set of effects explains (K)
+DELAY = EFFECTS["signal_delay"]
+_SHIFTS = ("signal_delay", "clock_skew")
 
 
 class Faster(NamedTuple):
@@ -230,3 +239,63 @@ def remarks(found: Sequence[PerTurn]) -> tuple[str, ...]:
     if to_causes(found):
         out.append("A tyre or rim that runs out of true, by its share of the radius, looks like an uneven tone ring.")
     return tuple(out)
+
+
+@dataclass(frozen=True, slots=True)
+class Late:
+    """`causes`: delays of one signal each; `doubts`: those of two signals, of which either may come late."""
+
+    causes: tuple[Cause, ...] = ()
+    doubts: tuple[Doubt, ...] = ()
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The delays as terms of a model."""
+        return tuple(Term(DELAY, {"delay": c.parameters["delay"].value}, c.where) for c in self.causes)
+
+    def known(self, asked: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+        """Hypotheses, in which such a signal's delay may be off by what the lag leaves open."""
+        own = {c.key for c in self.causes}
+        return tuple(replace(h, room=0.5 * HALF_S) if h.key in own else h for h in asked)
+
+    def beyond(self, causes: Sequence[Cause]) -> Late:
+        """Delays that are not among the causes of a diagnosis, with about this value."""
+        found = {c.key: c.parameters["delay"].value for c in causes if "delay" in c.parameters}
+        own = ((c, c.parameters["delay"]) for c in self.causes)
+        return Late(tuple(c for c, lag in own if not lag.low <= found.get(c.key, math.nan) <= lag.high))
+
+    def without(self, model: Model) -> Model:
+        """A model without them."""
+        return Model(tuple(t for t in model.terms if t not in self.terms))
+
+    def beside(self, outcome: Outcome[Option]) -> Outcome[Option]:
+        """The outcome with the delays; nothing is certain beside a signal that comes late unexplained."""
+        shifted = {c.where for c in outcome.causes if c.effect in _SHIFTS}
+        outcome = outcome.beside(*(c for c in self.causes if c.where not in shifted))
+        left = [d for d in self.doubts if not shifted & _places(d)]
+        if not left or not outcome.causes:
+            return outcome
+        why = f"Not certain: {left[0].what}, which these causes do not explain."
+        causes = tuple(replace(c, probability=DOUBTED * c.probability) for c in outcome.causes)
+        verdict: Verdict = "cannot_tell" if outcome.verdict in ("named", "compound") else outcome.verdict
+        return outcome._replace(verdict=verdict, causes=causes, certain=frozenset(), notes=(*outcome.notes, why))
+
+
+def found_late(drives: Sequence[Signals], vehicle: Vehicle, model: Model) -> Late:
+    """What comes late and is not in the model; of several drives all are doubts: each may have clocks of its own. So is
+    a delay beyond its physical bounds."""
+    known = {t.place for t in model.terms if t.effect.name in _SHIFTS}
+    doubts = [d for s in drives for d in delays_in(s, vehicle) if not known & _places(d)]
+    least, most = DELAY.parameters[0].low, DELAY.parameters[0].high
+    if len(drives) > 1 or any(len(_places(d)) > 1 or not least <= d.value <= most for d in doubts):
+        return Late((), tuple(doubts))
+    return Late(tuple(_cause(next(iter(_places(d))), d.value) for d in doubts))
+
+
+def _places(doubt: Doubt) -> set[str]:
+    return {s.partition("_")[0] if s.startswith(("omega", "torque")) else s for s in doubt.signals}
+
+
+def _cause(where: str, delay: float) -> Cause:
+    own = {"delay": Estimate(delay, delay - HALF_S, delay + HALF_S, "s")}
+    return Cause(DELAY.name, where, own, ("kinematic",), cause_sentence(DELAY, where, own), MOST)

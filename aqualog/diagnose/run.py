@@ -14,23 +14,20 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose import isolate
-from aqualog.diagnose.agreement import agreements, contradicted, widened
 from aqualog.diagnose.arena import by_drives, competing
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.drive import Drive, led_by, prepare
-from aqualog.diagnose.evidence import SURROGATES, Evidence, recentred, tolerant
-from aqualog.diagnose.faster import faster, joined, with_rings
+from aqualog.diagnose.evidence import SURROGATES, Evidence, around_water, recentred, tolerant
+from aqualog.diagnose.faster import Late, faster, found_late, joined, with_rings
 from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.grade import HILLY, Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
-from aqualog.diagnose.late import Late, found_late
 from aqualog.diagnose.next_manoeuvre import Rival, next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
-from aqualog.diagnose.on_water import around_water
-from aqualog.diagnose.outcome import conclude, with_causes
+from aqualog.diagnose.outcome import agreements, conclude, contradicted, widened, with_causes
 from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView
 from aqualog.diagnose.refit import Refit, likeliest, metric
 from aqualog.diagnose.search import Found, Option, Tell, search, simulated

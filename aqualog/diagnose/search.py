@@ -20,9 +20,17 @@ from aqualog.diagnose.compete import Members, Posterior, begin, compete
 from aqualog.diagnose.competition import COARSE, fitted_in, joined, placed
 from aqualog.diagnose.drive import Drive, led_by
 from aqualog.diagnose.elements import moments, with_elements
-from aqualog.diagnose.evidence import Calibration, Evidence, calibrate, forgiving, make_evidence, significance, tolerant
+from aqualog.diagnose.evidence import (
+    Calibration,
+    Evidence,
+    calibrate,
+    forgiving,
+    make_evidence,
+    of_water,
+    significance,
+    tolerant,
+)
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_free
-from aqualog.diagnose.on_water import of_water
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit, secants, silent
 from aqualog.diagnose.subsets import compatible, imitations

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aqualog.diagnose.agreement import contradicted, widened
+from aqualog.diagnose.outcome import contradicted, widened
 from aqualog.diagnose.records import Agreement, ByDrive, Cause, Estimate
 from aqualog.diagnose.run import Options, diagnose
 from tests.diagnose.test_drive import CAR, term

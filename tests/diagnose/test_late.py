@@ -3,7 +3,7 @@
 import pytest
 
 from aqualog.checks.doubts import Doubt
-from aqualog.diagnose.late import found_late
+from aqualog.diagnose.faster import found_late
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 from tests.checks.made import CAR, made, signals

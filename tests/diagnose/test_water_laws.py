@@ -12,8 +12,8 @@ from aqualog.diagnose import search
 from aqualog.diagnose.arena import arena_of, known_only
 from aqualog.diagnose.compete import compete
 from aqualog.diagnose.drive import BEYOND_GRIP, prepare, rolling_under, stretches
+from aqualog.diagnose.evidence import around_water, of_water
 from aqualog.diagnose.hypotheses import hypotheses, signatures
-from aqualog.diagnose.on_water import around_water, of_water
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import FORM, STRUCTURE, Found, Option, _levelled, _refitted, sharpened, simulated
 from aqualog.diagnose.subsets import supported
