@@ -15,7 +15,7 @@ import numpy as np
 from aqualog.checks.delays import delays_in
 from aqualog.checks.doubts import Doubt
 from aqualog.core.intervals import Z95
-from aqualog.core.notation import AXLES, SIDES, WHEELS
+from aqualog.core.notation import AXLES, SIDES, WHEELS, side_of
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.full_rate import LEVEL, Kind, PerTurn, per_turn, wheel_columns
@@ -96,11 +96,9 @@ def with_rings(model: Model, seen: Faster) -> Model:
 def _known(model: Model) -> dict[str, float]:
     """Amplitude by wheel that the model's own terms give."""
     out: dict[str, float] = {}
-    for t in model.terms:
-        if t.effect is _RING:
-            for w in WHEELS:
-                if w == t.place or t.place in (w[0], {"l": "left", "r": "right"}[w[1]]):
-                    out[w] = out.get(w, 0.0) + t.values.get("amplitude", 0.0)
+    for t in (t for t in model.terms if t.effect is _RING):
+        for w in (w for w in WHEELS if t.place in (w, w[0], side_of(w))):
+            out[w] = out.get(w, 0.0) + t.values.get("amplitude", 0.0)
     return out
 
 

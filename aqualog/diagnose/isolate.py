@@ -91,8 +91,7 @@ def confusions(evidence: Evidence, gram: FloatArray, sizes: FloatArray) -> tuple
     index = sorted({evidence.asked[i].key: i for i in reversed(seen)}.values())  # the first one of each
     c = np.array([evidence.columns[i][0] for i in index], dtype=np.intp)
     inner = G[np.ix_(c, c)]
-    energy = np.diag(inner)
-    theta = sizes[c]
+    energy, theta = np.diag(inner), sizes[c]
     # energy of row i that column j cannot imitate
     pairs = np.maximum((energy[:, None] - inner**2 / energy[None, :]) * theta[:, None] ** 2, 0.0)
     out = []

@@ -329,13 +329,12 @@ def _recommended(case: Case, o: _Option, before: float, *, enough: bool) -> Mano
     ]  # fmt: skip
     decided = [q for q in pairs if o.gives.pairs[q] >= SURE]
     rises = _rises(before, after)
-    how = f"{o.what.how}{OFTEN[o.times]} ({o.minutes:.0f} min)"
     if not enough:
         text = f"No run, check or further sensor distinguishes: {_told(members, pairs)}."
         if _percent(after) != _percent(before):
             text += f" The best is {o.what.name.replace('_', ' ')}{OFTEN[o.times]}: {rises}."
         return Manoeuvre("none", (), text, np.nan, np.nan, 0.0, before, after)
-    text = f"{how}: {rises}."
+    text = f"{o.what.how}{OFTEN[o.times]} ({o.minutes:.0f} min): {rises}."
     if o.sensor is not None:
         text = f"With these signals no run helps. Add {o.sensor.name} to the log. {text}"
     rest = [q for q in pairs if q not in decided]

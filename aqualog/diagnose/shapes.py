@@ -259,7 +259,6 @@ def shapes(coordinates: Mapping[str, FloatArray], mask: BoolArray, dt: float, ha
                 continue
             if names not in made:
                 made[names] = basis(names, [coordinates[n] for n in names], mask, dt)
-            found = made[names]
-            if found is not None:
+            if (found := made[names]) is not None:
                 out.append(Shape(m, names, found))
     return tuple(out)

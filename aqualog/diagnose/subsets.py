@@ -43,19 +43,14 @@ def compatible(evidence: Evidence, members: Sequence[int]) -> bool:
         for compared in (every & TURNING, every - TURNING):
             if len(late & compared) > 1 and len(late & compared) >= len(compared) - 1:
                 return False
-    seen: set[tuple[str, str, str]] = set()
-    shared = {h.effect.name for h in own if not h.drive}
+    shared, at = {h.effect.name for h in own if not h.drive}, []
     for h in own:
         if h.drive and h.effect.name in shared:
             return False  # what all drives have, and what each has besides, would differ by one value only
         # a load at the front and one removed at the rear are not two loads, but a shift of the centre of mass
         whole = h.where is None or h.effect.drive.is_single
-        places = WHEELS if whole else AXLES.get(h.where or "", (h.where or "",))
-        for p in places:
-            if (h.effect.name, p, h.drive) in seen:
-                return False
-            seen.add((h.effect.name, p, h.drive))
-    return True
+        at += [(h.effect.name, p, h.drive) for p in (WHEELS if whole else AXLES.get(h.where or "", (h.where or "",)))]
+    return len(set(at)) == len(at)
 
 
 def imitations(asked: Sequence[Hypothesis], members: Sequence[int]) -> list[tuple[int, ...]]:

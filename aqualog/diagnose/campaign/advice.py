@@ -107,9 +107,8 @@ def _expected(runs: Sequence[_Run], model: Model, passes: Passes) -> tuple[Float
     for run in runs:
         setup = assemble(run.scenario, model)
         if run.beside:
-            setup = setup._replace(
-                plant=setup.plant._replace(h_track=np.full(4, _FRONT_AWAY), track_irregularity=np.zeros(4))
-            )
+            plant = setup.plant._replace(h_track=np.full(4, _FRONT_AWAY), track_irregularity=np.zeros(4))
+            setup = setup._replace(plant=plant)
         setups.append(setup)
     k = len(runs)
     which, on, off = np.arange(k), np.ones(k, dtype=np.bool_), np.zeros(k, dtype=np.bool_)

@@ -68,8 +68,7 @@ class Told(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Passes:
-    """Observations of a campaign, one row per run `told` (g,): `values` (g, c) by `names` (c,), NaN where a run has
-    none.
+    """Observations of a campaign, one row per run `told` (g,): `values` (g, c) by `names` (c,), else NaN.
 
     For each driven wheel `slip_slope_<w>`: mean slip on water minus mean slip on dry road, and `dry_<w>`: mean slip on
     dry road [-]; `resistance`: mean resistance measure on water minus the run's dry level [m/s²]. `coordinates` by name
@@ -158,9 +157,8 @@ def steady(passes: Passes, model: Model) -> Passes:
 
 
 def expected_values(passes: Passes, model: Model, *, friction: float = 1.0) -> tuple[FloatArray, FloatArray]:
-    """Expected observations of a model (g, c), and their variances (g, c) by the road's fluctuation.
-    `friction`: factor on that of all wheels.
-    """
+    """Expected observations of a model (g, c), and their variances (g, c) by the road's fluctuation; `friction`: factor
+    on that of all wheels."""
     q, found = passes.question, _responses(passes, model, friction)
     values, variances = np.full((2, *passes.values.shape), np.nan)
     g = len(passes.told)
@@ -174,16 +172,13 @@ def expected_values(passes: Passes, model: Model, *, friction: float = 1.0) -> t
 
     for c, name in enumerate(passes.names):
         if name == RESISTANCE:
-            values[:, c] = means(found.resistance, wet=True)
-            variances[:, c] = means(found.resistance_variance, wet=True)
-            continue
-        wheel = WHEELS.index(name[-2:])
-        dry = means(found.slip[wheel], wet=False)
-        if name.startswith("dry_"):
-            values[:, c], variances[:, c] = dry, 0.0
+            mean, variance = (means(x, wet=True) for x in (found.resistance, found.resistance_variance))
         else:
-            values[:, c] = means(found.slip[wheel], wet=True) - dry
-            variances[:, c] = means(found.slip_variance[wheel], wet=True)
+            i = WHEELS.index(name[-2:])
+            mean, variance = means(found.slip[i], wet=False), np.zeros(g)
+            if not name.startswith("dry_"):
+                mean, variance = means(found.slip[i], wet=True) - mean, means(found.slip_variance[i], wet=True)
+        values[:, c], variances[:, c] = mean, variance
     # of a run's mean relative to one point of its lane: correlation length over distance
     for r, told in enumerate(passes.told):
         way = float(np.mean(told.wet.v)) * float(passes.seconds[r]) if told.wet is not None else math.inf
