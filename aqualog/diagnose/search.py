@@ -50,6 +50,7 @@ NEAR = 10.0  # [nats] behind the best set, within which a single effect is refit
 DOUBT = 0.05
 # share of what a set explains, by which a simulator of other structure errs: one more effect has to explain more
 STRUCTURE = DOUBT**2
+SOFT = ("slip_stiffness", "slip_stiffness_drift")  # beside which every force shows in another slip
 UNUSUAL = 3.0  # of its prior's standard deviations, beyond which a value is not listed by a relation alone
 
 Tell = Callable[[str, float], None]
@@ -176,9 +177,31 @@ def _repeated(arena: Arena, posterior: Posterior, model: Model) -> tuple[Arena, 
         found = refit(led, best, _start(arena, posterior, posterior.best), measure, model)
         if found is None or any(found.bounded):
             break
-        arena, done = _around(arena, found, secants(led, found, model), best), best
+        arena, done = _around(_softened(arena, led, found, best), found, secants(led, found, model), best), best
         posterior = compete(arena)
     return arena, posterior
+
+
+def _softened(arena: Arena, led: Evidence, found: Refit, chosen: Sequence[int]) -> Arena:
+    """The arena with the signatures of all other effects on tyres as soft as a set has found them.
+
+    A force shows in the slip as its share of the slip stiffness. With the file's, a brake that drags on soft tyres would
+    look like two effects.
+    """
+    asked = arena.evidence.asked
+    if not any(asked[i].effect.name in SOFT for i in chosen):
+        return arena
+    sought = [i for i, h in enumerate(asked) if not (h.allowed or h.effect.drive.begins_like)]
+    again = [asked[i] for i in sought]
+    found_by = [signatures(d, found.model, again, base=r) for d, r in zip(led.drives, found.residuals, strict=True)]
+    columns = [c for i in sought for c in arena.evidence.columns[i]]
+    own = [np.concatenate(x) for x in found_by]
+    parts = []
+    for p in arena.parts:
+        changed = p.signatures.copy()
+        changed[columns] = own[p.drive][..., p.at]
+        parts.append(replace(p, signatures=changed))
+    return replace(arena, parts=tuple(parts))
 
 
 def _led(arena: Arena, posterior: Posterior, model: Model) -> Evidence:

@@ -305,7 +305,7 @@ def test_a_pass_that_sweeps_the_speed_counts_where_its_wheel_stops():
         data._samples[info.index] = RunSamples(s.frame.with_columns(v_x=v, slip_min_fr=slip), s.t, s.on_water)
     cells = plan(data, ["tyre"])
     (found,) = (f for f in full_speeds(data, cells, slip_slopes(data, cells)) if f.way == "spin_down")
-    assert 85.0 < found.v / KMH < 108.5  # none had stopped at 85 km/h
+    assert 107.0 < found.v / KMH < 109.0
     rows = [r for r in minor_spin_downs(data, cells) if r.wheel == "fr"]
     assert {r.low_kmh: r.full for r in rows if r.full} == {100.0: sum(r.full for r in rows)}
     assert {r.low_kmh for r in rows} >= {50.0, 60.0, 70.0, 80.0}

@@ -372,6 +372,15 @@ def test_half_of_the_slip_slope_is_more_than_a_file_of_8_percent_leaves_open(mon
         assert (d.verdict, keys(d)) == (verdict, {"slip_stiffness@r"})
 
 
+def test_a_brake_and_soft_tyres_are_two_effects(monkeypatch):
+    """The slip of a wheel that is braked is its force over the slip stiffness that is found, not the file's."""
+    names = ("brake_drag", "slip_stiffness", "tyre_radius")
+    ask(monkeypatch, [f"{e}@{at}" for e in names for at in ("fl", "fr", "f")])
+    d = told(term("brake_drag", "fr", torque=250.0), term("slip_stiffness", "f", gain=0.5))
+    assert keys(d) == {"brake_drag@fr", "slip_stiffness@f"}
+    assert d.causes[0].parameters["torque"].value == pytest.approx(250.0, abs=5.0)
+
+
 def test_a_late_velocity_is_named_without_one_of_the_wheels(monkeypatch):
     ask(monkeypatch, ("signal_delay@v_x", "signal_delay@a_x", "signal_delay@torque", "clock_skew"))
     d = told(log=noisy(term("signal_delay", "v_x", delay=0.1), drop=["omega_rr"]))
