@@ -11,6 +11,7 @@ import polars as pl
 import pytest
 
 from aqualog.core.errors import ConfigError, SignalError
+from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.provenance import Provenance
 from aqualog.diagnose import arena, run, search
 from aqualog.diagnose.hypotheses import hypotheses
@@ -375,7 +376,7 @@ def test_half_of_the_slip_slope_is_more_than_a_file_of_8_percent_leaves_open(mon
 def test_a_brake_and_soft_tyres_are_two_effects(monkeypatch):
     """The slip of a wheel that is braked is its force over the slip stiffness that is found, not the file's."""
     names = ("brake_drag", "slip_stiffness", "tyre_radius")
-    ask(monkeypatch, [f"{e}@{at}" for e in names for at in ("fl", "fr", "f")])
+    ask(monkeypatch, [f"{e}@{at}" for e in names for at in (*WHEELS, *AXLES)])
     d = told(term("brake_drag", "fr", torque=250.0), term("slip_stiffness", "f", gain=0.5))
     assert keys(d) == {"brake_drag@fr", "slip_stiffness@f"}
     assert d.causes[0].parameters["torque"].value == pytest.approx(250.0, abs=5.0)
