@@ -33,6 +33,7 @@ TAU_YAW = 0.05  # [s] the yaw rate is differentiated with the wheel speeds
 TAU_WHEEL = 0.03  # [s] wheel acceleration
 FADE = 0.5  # [s] a yaw rate that is missing fades out of the correction
 TAU_COMMON = 0.3  # [s] what all wheels share is an error of the velocity (a late reference), and slow
+SPIN_DOWN = 8.0  # [m/s²] at the rim, behind the other wheels: beyond what a road shakes (K)
 TAU_LOAD = 0.10  # [s] load transfer follows the body, not the accelerometer's noise
 
 Features = Mapping[str, FloatArray]
@@ -187,9 +188,10 @@ class FeatureStream:
                     r_w=vehicle.rolling_resistance,
                 )  # fmt: skip
         # a wheel that slows down faster than the car gives its momentum to the water, not to the car: only a wheel that
-        # spins up has taken torque from the road, else every spin-down would look like resistance
-        middle = _middle(omega_dot)
-        spinning_up = np.fmax(omega_dot, middle)
+        # spins up has taken torque from the road, else every spin-down would look like resistance; a wheel that shakes
+        # does both in turn, and has both
+        lag = omega_dot - _middle(omega_dot)
+        spinning_up = np.where(lag < -SPIN_DOWN / self._r_e[:, None], omega_dot - lag, omega_dot)
         out["torque_sum"] = torque[0] + torque[1] + torque[2] + torque[3]
         if "a_x" in self.available:
             a_nom = nominal_acceleration(
