@@ -12,10 +12,7 @@ from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.physics.kinematics import centre_line_speed, kinematic_steer_angle
 
-__all__ = [
-    "BLOCK_S", "CHANNELS", "Kind", "block_means", "block_step", "centre_line_speeds", "channel_values", "channels_of",
-    "contrasts",
-]  # fmt: skip
+__all__ = ["CHANNELS", "block_means", "block_step", "centre_line_speeds", "channel_values", "channels_of", "contrasts"]
 
 BLOCK_S = 0.1  # [s] keeps what is slower than 5 Hz; faster motion comes from springs, gear teeth and buses
 

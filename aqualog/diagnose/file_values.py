@@ -14,10 +14,7 @@ from aqualog.diagnose.words import listed
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 
-__all__ = [
-    "as_value", "calibrated_enough", "day_to_day", "deviation", "key_of", "not_calibrated", "own_sd",
-    "with_known",
-]  # fmt: skip
+__all__ = ["as_value", "calibrated_enough", "day_to_day", "deviation", "key_of", "not_calibrated", "with_known"]
 
 TORQUE_BY_DRIVE = 0.01  # relative, where a file gives no spread: a bus estimates its torque to 1 to 3 % (K)
 _MATTERS = ("mass", "torque_gain", "wheels.r_e_f", "wheels.r_e_r")

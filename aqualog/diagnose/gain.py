@@ -21,10 +21,7 @@ from aqualog.diagnose.threads import beside
 from aqualog.model.follow import follow
 from aqualog.model.term import Model
 
-__all__ = [
-    "BLOCK_S", "DRIVES_AS_UNITS", "LogScoreGain", "block_scores", "log_score_gain", "measured_gain", "rms_of_both",
-    "scope",
-]  # fmt: skip
+__all__ = ["BLOCK_S", "block_scores", "log_score_gain", "measured_gain", "rms_of_both", "scope"]
 
 BLOCK_S = 20.0  # [s] longer than the noise of any channel remembers
 DRIVES_AS_UNITS = 5  # with fewer drives their spread cannot be estimated

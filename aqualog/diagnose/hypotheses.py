@@ -206,7 +206,7 @@ def value_in(model: Model, h: Hypothesis, name: str) -> float:
 
 
 def residual(drive: Drive, model: Model, *, step: float = STEP_S, like: Led | None = None) -> FloatArray:
-    """Residual channels of a drive under a model, simulated in steps of `step` [s]. (C, m) A model that changes the
+    """Residual channels (C, m) of a drive under a model, simulated in steps of `step` [s]. A model that changes the
     velocity's sensor changes the target speed, too. `like`: the drive along the same course in these steps under
     another model, which need not be driven again for a sensor's effect."""
     shown = simulated(drive, model, step=step, like=like)

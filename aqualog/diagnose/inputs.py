@@ -83,8 +83,8 @@ def quiet(x: FloatArray, dt: float, rate_hz: float | None = None) -> FloatArray:
 
 
 def quiet_speed(v: FloatArray, dt: float) -> FloatArray:
-    """A speed without its noise, by Wiener's filter and a mean over a second; it has no delay. (n,) to (n,) [m/s] The
-    simulated car would follow the remaining noise."""
+    """A speed (n,) [m/s] without its noise, which the simulated car would follow, by Wiener's filter and a mean over a
+    second; it has no delay."""
     return smooth(_filtered(v, dt, SPEED_BAND_HZ), dt, SPEED_S)
 
 
@@ -203,8 +203,8 @@ def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
 def road_wheel_angle(
     columns: Mapping[str, FloatArray], v: FloatArray, vehicle: Vehicle, dt: float, *, most: float
 ) -> FloatArray:
-    """Angle of the front wheels, measured or computed from the gyro with the model. (n,) [rad], left positive `most`
-    [m/s²]: lateral acceleration beyond which it is cut, because the simulated car could spin."""
+    """Angle of the front wheels (n,), left positive [rad], measured or computed from the gyro with the model; `most`:
+    lateral acceleration beyond which it is cut, because the simulated car could spin [m/s²]."""
     understeer = understeer_gradient(Tyre().cornering_slope)
     if "steer_angle" in columns:
         angle = columns["steer_angle"]

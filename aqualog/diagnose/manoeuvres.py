@@ -13,9 +13,7 @@ from aqualog.model.follow import PERFECT
 from aqualog.model.scenario import Lane, Profile, Scenario, Steering
 from aqualog.model.term import Check, Model
 
-__all__ = [
-    "LENGTH_S", "RUNS", "SENSORS", "Run", "Sensor", "checks", "fitting", "programme", "turned",
-]  # fmt: skip
+__all__ = ["RUNS", "SENSORS", "Run", "Sensor", "checks", "fitting", "programme", "turned"]
 
 LENGTH_S = 60.0
 RATE_HZ = 50.0  # [Hz] of a simulated run; residuals are means over 0.1 s

@@ -19,10 +19,7 @@ from aqualog.core.compiled import compiled, plain
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.threads import beside
 
-__all__ = [
-    "MEMORY", "Noise", "Weighing", "bridged", "fit_noise", "for_mask", "good_size", "weighing", "white_noise",
-    "whitened",
-]  # fmt: skip
+__all__ = ["MEMORY", "Noise", "Weighing", "bridged", "fit_noise", "for_mask", "weighing", "white_noise", "whitened"]
 
 # lags of the autoregression, from ... to, as means [samples]
 _BLOCKS = (

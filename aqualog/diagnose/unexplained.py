@@ -325,8 +325,8 @@ def slow_force(drive: Drive, left: FloatArray, model: Model) -> Remainder | None
 
 
 def _wander(drive: Drive, left: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-    """Middles of windows of 10 s [s], what force balance and wheels against torque show alike there on average, 0 where
-    they disagree, without what goes with speed and torque and with it [m/s²], each (k,), and the mean square of the
+    """Middles of windows of 10 s [s], what force balance and wheels against torque show alike there, without what goes
+    with speed and torque and with it, 0 where they disagree [m/s²], each (k,), and the mean square of the
     accelerometer's own [m²/s⁴]."""
     step = block_step(drive.dt)
     number = (np.arange(left.shape[1]) * step // WINDOW_S).astype(np.intp)
