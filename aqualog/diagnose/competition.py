@@ -93,15 +93,9 @@ def packed(blocks: Sequence[Block]) -> tuple[Packed, ...]:
     return tuple(out)
 
 
-class Scores(NamedTuple):
-    """Evidence gained over the scales of the prior (B,), and the scale that gains most (B,)."""
-
-    gain: FloatArray
-    scale: FloatArray
-
-
-def scores(inner: FloatArray, own: Packed) -> Scores:
-    """What each of some blocks gains beside a set, from the inner products (K + 1, K + 1) there."""
+def scores(inner: FloatArray, own: Packed) -> tuple[FloatArray, FloatArray]:
+    """Evidence that each of some blocks gains beside a set over the scales of its prior (B,), and the scale that gains
+    most (B,), from the inner products (K + 1, K + 1) there."""
     A = inner[own.columns[:, :, None], own.columns[:, None, :]]
     transposed = own.root.transpose(0, 2, 1)
     w, V = np.linalg.eigh(transposed @ A @ own.root)
@@ -118,7 +112,7 @@ def scores(inner: FloatArray, own: Packed) -> Scores:
     top = gains.max(axis=0)
     safe = np.where(np.isfinite(top), top, 0.0)
     total = safe + np.log(np.exp(gains - safe).mean(axis=0) + 1e-300)
-    return Scores(np.where(np.isfinite(top), total, -np.inf), np.array(SCALES)[gains.argmax(axis=0)])
+    return np.where(np.isfinite(top), total, -np.inf), np.array(SCALES)[gains.argmax(axis=0)]
 
 
 def added(state: State, index: int, block: Block) -> State:
@@ -289,7 +283,7 @@ def _gains(
     out = np.full(len(blocks), -np.inf)
     prior = np.array([b.log_prior for b in blocks])
     for own in together:
-        out[own.at] = np.where(_show(state.inner, own, inner), scores(state.inner, own).gain + prior[own.at], -np.inf)
+        out[own.at] = np.where(_show(state.inner, own, inner), scores(state.inner, own)[0] + prior[own.at], -np.inf)
     return out
 
 

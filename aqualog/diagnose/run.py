@@ -293,9 +293,8 @@ def _road(drive: Drive, model: Model, name: str) -> Profile | None:
 def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
     cause = road.cause
     if road.rms.value < HILLY or cause.probability < SURE:
-        why = "Significant, but too small to be worth naming"
-        if cause.probability < SURE:
-            why = f"Probability {cause.probability:.2f}, not named"
+        small = "Significant, but too small to be worth naming"
+        why = f"Probability {cause.probability:.2f}, not named" if cause.probability < SURE else small
         return outcome._replace(notes=(*outcome.notes, f"{why}: {cause.sentence}"))
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:
         # one road: a constant slope is its mean, whose interval knows that it is an offset as well

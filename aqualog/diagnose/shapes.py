@@ -48,15 +48,10 @@ class _Axis(NamedTuple):
     length: float
 
     @property
-    def centres(self) -> FloatArray:
-        """Where the coefficients sit (Greville), scaled to the range."""
-        k, p = self.knots, self.degree
-        at = np.array([k[i + 1 : i + p + 1].mean() for i in range(k.size - p - 1)])
-        return np.asarray((at - k[0]) / (k[-1] - k[0]))
-
-    @property
     def prior(self) -> FloatArray:
-        x = self.centres
+        """Covariance of the coefficients by where they sit (Greville), scaled to the range. (K, K)"""
+        k, p = self.knots, self.degree
+        x = (np.array([k[i + 1 : i + p + 1].mean() for i in range(k.size - p - 1)]) - k[0]) / (k[-1] - k[0])
         return np.asarray(np.exp(-0.5 * ((x[:, None] - x) / self.length) ** 2) + NUGGET * np.eye(x.size))
 
 

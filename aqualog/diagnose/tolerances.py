@@ -15,13 +15,14 @@ from aqualog.model.term import Effect, Parameter, Setup
 __all__ = ["LANE_TOLERANCES", "STAND_IN", "TOLERANCES"]
 
 
-def _plant(change: Callable[[Plant, float], Plant]) -> Callable[[Setup, Mapping[str, float], str | None], Setup]:
+_Apply = Callable[[Setup, Mapping[str, float], str | None], Setup]
+
+
+def _plant(change: Callable[[Plant, float], Plant]) -> _Apply:
     return lambda setup, v, _: setup._replace(plant=change(setup.plant, v["by"]))
 
 
-def _channel(signal: str, change: Callable[[Channel, float], Channel]) -> Callable[
-    [Setup, Mapping[str, float], str | None], Setup
-]:  # fmt: skip
+def _channel(signal: str, change: Callable[[Channel, float], Channel]) -> _Apply:
     def apply(setup: Setup, v: Mapping[str, float], _: str | None) -> Setup:
         old = setup.sensors.channels.get(signal, Channel())
         return setup._replace(sensors=setup.sensors.with_channel(signal, change(old, v["by"])))
@@ -29,9 +30,7 @@ def _channel(signal: str, change: Callable[[Channel, float], Channel]) -> Callab
     return apply
 
 
-def _of(
-    name: str, what: str, unit: str, sd: float, apply: Callable[[Setup, Mapping[str, float], str | None], Setup]
-) -> Effect:
+def _of(name: str, what: str, unit: str, sd: float, apply: _Apply) -> Effect:
     by = Parameter("by", unit, 0.0, sd, -20.0 * sd, 20.0 * sd, sd, "deviation; sigma is the tolerance (K)")
     return Effect(name, what, "", "general knowledge", (by,), apply)
 

@@ -195,13 +195,9 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
     size = [float(r / LEAST[CHANNELS[c].unit]) for r, c in zip(rms, names, strict=True)]
     of_wheels = arena.mechanism(members[0]).name.startswith(("slip", "radius"))
     every = [x for x in zip(size, share.tolist(), names, strict=True) if not of_wheels or "slip" in x[2]]
-    return max(every, key=_how_clear, default=(0.0, 0.0, channels[0]))
-
-
-def _how_clear(where: tuple[float, float, str]) -> tuple[int, float]:
-    """By which `_where` chooses: what is large first, then what counts if it is certain, then what explains most."""
-    size, share, _ = where
-    return (share > WORTH_TELLING) * ((size > 1.0) + (size > LITTLE)), share
+    # what is large first, then what counts if it is certain, then what explains most
+    clear = [((q > WORTH_TELLING) * ((s > 1.0) + (s > LITTLE)), q) for s, q, _ in every]
+    return every[clear.index(max(clear))] if every else (0.0, 0.0, channels[0])
 
 
 def _most(f: FloatArray) -> FloatArray:

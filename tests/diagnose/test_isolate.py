@@ -98,7 +98,7 @@ def test_at_the_limit_an_effect_is_as_likely_as_none(of_file):
     size = likelier_than_none(b, [block], forgiving(COARSE * plain(b), allowed).gram)[c]
     inner = COARSE * plain(b)
     inner[:, -1] = inner[-1] = size * np.append(inner[:-1, c], 0.0)
-    gain = scores(forgiving(inner, allowed).gram, packed([block])[0]).gain[0]
+    gain = scores(forgiving(inner, allowed).gram, packed([block])[0])[0][0]
     assert 0.0 <= gain + block.log_prior <= np.log(2.0)  # one of the prior's two scales alone reaches zero
 
 
