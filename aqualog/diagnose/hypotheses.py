@@ -155,12 +155,8 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
     # without torque there is no drag to test, nor one that differs
     asked_at = {(h.effect.name, h.where) for h in out}
-    out += [
-        Hypothesis(e, None, ("by",), {"lane": k})
-        for k in range(lanes)
-        for source, e in LANE_TOLERANCES.items()
-        if source in asked_at
-    ]
+    laws = [e for source, e in LANE_TOLERANCES.items() if source in asked_at]
+    out += [Hypothesis(e, None, ("by",), {"lane": k}) for k in range(lanes) for e in laws]
     return tuple(out), untested
 
 

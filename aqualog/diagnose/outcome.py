@@ -259,12 +259,9 @@ def contradicted(causes: Sequence[Cause], found: Sequence[Agreement]) -> bool:
     """Whether a cause is in some drives and not in others: they differ, and its interval holds no effect."""
     differ = {a.key for a in found if a.p_value < AGREES}
     neutral = {(c.effect, p.name): p.neutral for c in causes for p in EFFECTS[c.effect].parameters}
-    return any(
-        c.key in differ
-        and not c.drives
-        and all(e.low <= neutral.get((c.effect, n), math.nan) <= e.high for n, e in c.parameters.items())
-        for c in causes
-    )
+    shared = [c for c in causes if c.key in differ and not c.drives]
+    by_cause = [[(neutral.get((c.effect, n), math.nan), e) for n, e in c.parameters.items()] for c in shared]
+    return any(all(e.low <= x <= e.high for x, e in own) for own in by_cause)
 
 
 def _heterogeneity(each: Sequence[Estimate]) -> float:

@@ -257,12 +257,8 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
         own = np.linalg.inv(G[t] + prior)
         alone, sd = own @ b[t], np.sqrt(np.diag(own))
         for k, (h, _) in enumerate(refit.names):
-            if (
-                (h.key, h.drive) in names
-                and abs(off[k]) > SEEN * sd[k]
-                and alone[k] * off[k] < 0.0
-                and abs(alone[k]) > SEEN * sd[k]
-            ):
+            is_seen = min(abs(off[k]), abs(alone[k])) > SEEN * sd[k]
+            if (h.key, h.drive) in names and is_seen and alone[k] * off[k] < 0.0:
                 out.append(f"{name_of(h.effect.name, h.where)} has the other sign in {_ORDINAL[t]} third of the drive.")
         rest = [o for o in range(THIRDS) if o != t]
         others = np.linalg.solve(sum(G[o] for o in rest) + prior, sum(b[o] for o in rest))
