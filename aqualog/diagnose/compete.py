@@ -29,9 +29,9 @@ from aqualog.diagnose.competition import (
     searched,
 )
 from aqualog.diagnose.evidence import Evidence, forgiving
+from aqualog.diagnose.isolate import TWINS, compatible
 from aqualog.diagnose.noise import Weighing
 from aqualog.diagnose.shapes import ALONG
-from aqualog.diagnose.subsets import TWINS, compatible
 from aqualog.diagnose.threads import beside
 
 __all__ = ["Begun", "Fitted", "Members", "Posterior", "begin", "compete", "rule"]

@@ -33,7 +33,7 @@ EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect expl
 def conclude(found: Found, model: Model) -> Outcome[Option]:
     """The verdict on what a search found. An unknown form comes before any name; beside it stand the effects of the
     same set whose probability is 0.95 or more, and whose values are not at a physical bound, but they are not certain.
-    A name needs that probability too, and must pass the checks of `shown.repeats`. An only answer that is not named and
+    A name needs that probability too, and must pass the checks of `refit.repeats`. An only answer that is not named and
     leaves the channels larger than it finds them is noise."""
     if found.forms:
         linear = _linear(found, found.posterior.best, model)

@@ -25,13 +25,13 @@ from aqualog.diagnose.file_values import not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.grade import HILLY, Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
+from aqualog.diagnose.isolate import supported
 from aqualog.diagnose.next_manoeuvre import Rival, next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.outcome import agreements, conclude, contradicted, widened, with_causes
 from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView
 from aqualog.diagnose.refit import Refit, likeliest, metric
 from aqualog.diagnose.search import Found, Option, Tell, search, simulated
-from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unexplained import slow_force
 from aqualog.diagnose.unknown_term import as_term, short_form

@@ -31,9 +31,9 @@ from aqualog.diagnose.evidence import (
     tolerant,
 )
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_free
+from aqualog.diagnose.isolate import compatible, imitations
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit, secants, silent
-from aqualog.diagnose.subsets import compatible, imitations
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unexplained import unknown_forms
 from aqualog.diagnose.words import listed, name_of

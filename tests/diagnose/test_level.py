@@ -10,7 +10,7 @@ import pytest
 from aqualog.campaign.definition import Run, with_load
 from aqualog.campaign.measure import measure
 from aqualog.core.intervals import chi2_log_p
-from aqualog.diagnose.campaign import diagnose_campaign, outcome, refit
+from aqualog.diagnose.campaign import diagnose_campaign, refit, run
 from aqualog.diagnose.campaign.expect import Driven, respond
 from aqualog.diagnose.campaign.passes import expected_values, passes_of
 from aqualog.diagnose.campaign.refit import fit
@@ -127,7 +127,7 @@ def cleared():
 
 def test_track_clearing_is_the_answer(cleared, monkeypatch):
     taken = []
-    monkeypatch.setattr(outcome, "estimates", lambda *given: taken.append(given) or refit.estimates(*given))
+    monkeypatch.setattr(run, "estimates", lambda *given: taken.append(given) or refit.estimates(*given))
     found = diagnose_campaign(cleared, options=Options(surrogates=19))
     (cause,) = found.causes
     assert cause.key == "track_clearing"

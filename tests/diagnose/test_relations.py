@@ -3,7 +3,7 @@
 import pytest
 
 from aqualog.diagnose import run
-from aqualog.diagnose.subsets import imitations
+from aqualog.diagnose.isolate import imitations
 from tests.diagnose.test_run import ask, few, keys, noisy, term, told  # noqa: F401 - `few` is a fixture
 from tests.diagnose.test_subsets import ASKED, AT, hypothesis
 

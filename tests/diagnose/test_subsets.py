@@ -12,7 +12,7 @@ from aqualog.diagnose.compete import compete
 from aqualog.diagnose.competition import fitted_in
 from aqualog.diagnose.evidence import gains_of, make_evidence, tolerant
 from aqualog.diagnose.hypotheses import Hypothesis
-from aqualog.diagnose.subsets import compatible
+from aqualog.diagnose.isolate import compatible
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model
 

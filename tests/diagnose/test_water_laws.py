@@ -14,9 +14,9 @@ from aqualog.diagnose.compete import compete
 from aqualog.diagnose.drive import BEYOND_GRIP, prepare, rolling_under, stretches
 from aqualog.diagnose.evidence import around_water, of_water
 from aqualog.diagnose.hypotheses import hypotheses, signatures
+from aqualog.diagnose.isolate import supported
 from aqualog.diagnose.refit import KNOWN, metric, refit
 from aqualog.diagnose.search import FORM, STRUCTURE, Found, Option, _levelled, _refitted, sharpened, simulated
-from aqualog.diagnose.subsets import supported
 from aqualog.diagnose.tolerances import LANE_TOLERANCES
 from aqualog.model.follow import follow
 from aqualog.model.scenario import Lane
