@@ -46,7 +46,7 @@ class Extended(NamedTuple):
 
 def extended_inputs(signals: Signals, vehicle: Vehicle, model: Model) -> Extended:
     """Signals as loaded with `vehicle`, and vehicle, for the detectors, with the terms of a model taken into account;
-    the given objects themselves if there are none, or only neutral ones.
+    the given objects themselves without any, or with neutral ones only.
 
     Terms for which the vehicle file has a key change the vehicle; ConfigError if beyond its limits. Others change the
     signals: a sensor's error is removed, a wheel whose radius differs from its axle's is converted to that radius. A

@@ -96,7 +96,11 @@ def _diagnosed(
     ready, notes = _prepared(drives, vehicle)
     notes += tuple(f"Known: {term_words(t)}." for t in model.terms[len(given.terms) :])
     if reason := _unusable(ready, drives):
-        return _not_testable(ready, model, reason, notes, vehicle)
+        return Diagnosis(
+            "not_testable", f"Not testable: {reason}.", tuple(d.name for d in ready), sum(d.duration_s for d in ready),
+            sum(d.used_s for d in ready), model, ready[0].channels, notes=notes,
+            caution=not_calibrated(vehicle, ready[0].channels),
+        )  # fmt: skip
     names = {d.name for d in ready}
     if (model := Model((*model.terms, *late.terms))).terms:
         ready = [led_by(d, model) for d in ready]
@@ -396,16 +400,6 @@ def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> 
     lacks = [n for n, signals in _MOVES.items() if not any(set(signals) & d.present for d in ready)]
     hint = f"; the log has no {listed(lacks, 'or')}: name the channels in a map (--signals)" if lacks else ""
     return f"{used:.0f} s of usable driving, {LEAST_USED_S:.0f} s are needed{hint}"
-
-
-def _not_testable(
-    drives: Sequence[Drive], model: Model, reason: str, notes: tuple[str, ...], vehicle: Vehicle
-) -> Diagnosis:
-    return Diagnosis(
-        "not_testable", f"Not testable: {reason}.", tuple(d.name for d in drives), sum(d.duration_s for d in drives),
-        sum(d.used_s for d in drives), model, drives[0].channels, notes=notes,
-        caution=not_calibrated(vehicle, drives[0].channels),
-    )  # fmt: skip
 
 
 def _views(
