@@ -12,8 +12,8 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 97_480
-MOST_FILES = 518
+MOST_LINES = 96_549
+MOST_FILES = 502
 MOST_TEST_LINES = 71_150
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
