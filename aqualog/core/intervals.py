@@ -13,7 +13,7 @@ from aqualog.core.records import FloatArray
 
 __all__ = [
     "NOWHERE", "Z95", "Interval", "chi2_log_p", "half_width", "jackknife_sd", "poisson", "same_decimals",
-    "student_quantile", "variance_ratio_chance", "wilson",
+    "student_quantile", "variance_ratio_chance", "widened", "wilson",
 ]  # fmt: skip
 
 Interval = tuple[float, float]
@@ -44,6 +44,18 @@ def student_quantile(probability: float, dof: float) -> float:
 def half_width(sigma: float, dof: float, level: float = 0.95) -> float:
     """Half the interval of a value with standard deviation `sigma`, by Student's t."""
     return student_quantile(0.5 + level / 2.0, dof) * sigma
+
+
+def widened(value: float, draws: FloatArray, dof: float, level: float = 0.95) -> Interval:
+    """Return the interval of a value from its bootstrap draws (b,): few units with `dof` degrees of freedom.
+
+    The distances of the draws' quantiles from the value, times Student's t over the normal quantile [student1908]. The
+    value is within, also where the draws lie on one side of it.
+    """
+    tail = 0.5 * (1.0 - level)
+    factor = student_quantile(1.0 - tail, dof) / NormalDist().inv_cdf(1.0 - tail)
+    low, high = (factor * (float(x) - value) for x in np.quantile(draws, (tail, 1.0 - tail)))
+    return value + min(low, 0.0), value + max(high, 0.0)
 
 
 def chi2_log_p(x: float, dof: int) -> float:

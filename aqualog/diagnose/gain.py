@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aqualog.core.errors import FitError
-from aqualog.core.intervals import Z95, student_quantile
+from aqualog.core.intervals import widened
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import CHANNELS, block_means, block_step
 from aqualog.diagnose.drive import Drive, led_by
@@ -129,9 +129,7 @@ def log_score_gain(before: Sequence[FloatArray], after: Sequence[FloatArray], *,
         if s.size > 1:
             drawn = s[rng.integers(s.size, size=(DRAWS, s.size))].sum(axis=1) - s.sum()
             deviation += math.sqrt(s.size / (s.size - 1.0)) * drawn
-    wider = student_quantile(0.975, freedom) / Z95
-    low, high = np.quantile(deviation, [0.025, 0.975])
-    return LogScoreGain(value, value + wider * float(low), value + wider * float(high))
+    return LogScoreGain(value, *widened(value, value + deviation, freedom))
 
 
 def _drives_are_units(blocks: Sequence[FloatArray]) -> bool:

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from aqualog.core.intervals import NOWHERE, Interval
+from aqualog.core.intervals import NOWHERE, Interval, widened
 from aqualog.core.records import FloatArray
 from aqualog.trade.concave import area_under, concave_fit, falls_to
 from aqualog.trade.control import Estimate
@@ -104,8 +104,9 @@ def curve_set(
     Notes
     -----
     Passes whose speeds round to the same multiple of `limits.speed_step` are one step. The interval is from 400
-    bootstrap draws of the passes of each step; deviations from a step's mean of n passes are widened by
-    sqrt(n / (n - 1)), since its mean is its own. A step of one pass takes the deviations of the others.
+    bootstrap draws of the passes of each step, widened by Student's t: degrees of freedom are the passes less the
+    steps. Deviations from a step's mean of n passes grow by sqrt(n / (n - 1)), since its mean is its own. A step of one
+    pass takes the deviations of the others.
     """
     good = _steps([p for p in passes if p.valid], limits)
     empty = np.zeros(0)
@@ -116,16 +117,14 @@ def curve_set(
     own = _read(v, *curves, good.means(good.dry), limits, result, between)
     draws = _draws(good, v, limits, result, between)
     spread = draws.std(axis=0, ddof=1) if draws.size else np.full(4, np.nan)
-    tail = 0.5 * (1.0 - level)
+    dof = float(good.v.size - v.size)
 
     def interval(k: int) -> Interval:
         seen = draws[np.isfinite(draws[:, k]), k] if draws.size else draws
         if not draws.size or not math.isfinite(own[k]) or seen.size < 0.5 * DRAWS:
             return NOWHERE
-        low, high = np.quantile(seen, (tail, 1.0 - tail))
-        return float(low), float(high)
+        return widened(own[k], seen, dof, level)
 
-    dof = float(good.v.size - v.size)
     return CurveSet(
         v, *curves, good.means(good.dry), own[0], interval(0), Estimate(own[0], float(spread[0]) ** 2, dof),
         _within(v, own[1], interval(1)), (own[2], interval(2)), (own[3], interval(3)), len(passes), int(good.v.size),

@@ -1,16 +1,31 @@
 """Intervals and chances against tables, equations and SciPy."""
 
 import math
+from statistics import NormalDist
 
 import numpy as np
 import pytest
 
-from aqualog.core.intervals import jackknife_sd, poisson, same_decimals, student_quantile, variance_ratio_chance, wilson
+from aqualog.core.intervals import (
+    jackknife_sd,
+    poisson,
+    same_decimals,
+    student_quantile,
+    variance_ratio_chance,
+    widened,
+    wilson,
+)  # fmt: skip
 
 
 def test_quantiles_of_student():
     for dof, quantile in ((1, 12.7062), (2, 4.3027), (5, 2.5706), (11, 2.2010), (100, 1.9840)):
         assert student_quantile(0.975, dof) == pytest.approx(quantile, rel=1e-4)
+
+
+def test_normal_draws_give_the_interval_of_student():
+    draws = np.array([NormalDist(7.0, 2.0).inv_cdf(p) for p in np.linspace(0.0005, 0.9995, 1000)])
+    assert widened(7.0, draws, 2.0) == pytest.approx((7.0 - 4.3027 * 2.0, 7.0 + 4.3027 * 2.0), abs=0.05)
+    assert widened(9.0, np.full(10, 8.0), 2.0) == pytest.approx((9.0 - 4.3027 / 1.96, 9.0), rel=1e-4)
 
 
 def test_an_estimate_has_the_decimals_of_its_interval():

@@ -127,7 +127,7 @@ def test_the_greatest_lies_between_steps():
 
 @pytest.mark.parametrize(
     ("top", "told"),
-    [(50.0, "≤ 60.0"), (90.0, "≥ 80.0"), (61.5, "≤ 62.9"), (63.5, "63.5 (open … 64.4)"), (76.5, "76.5 (75.7 … open)")],
+    [(50.0, "≤ 60.0"), (90.0, "≥ 80.0"), (61.5, "≤ 63.3"), (63.5, "63.5 (open … 64.5)"), (76.5, "76.5 (75.6 … open)")],
 )
 def test_the_greatest_at_an_end_is_a_bound(top, told):
     def at(v, k):
@@ -161,6 +161,9 @@ def test_interval_of_a_set_by_bootstrap():
     assert made.ci[0] < 3.0 < made.ci[1]
     assert 0.02 < made.estimate.variance**0.5 < 0.12
     assert made.estimate.dof == 12.0
+    few = curve_set(passes(spread=0.3, speeds=(60, 65)), LIMITS, result="mean", between=(60 * KMH, 65 * KMH))
+    for found, t in ((made, 2.179), (few, 2.776)):  # of 12 and 4 degrees of freedom; a step has three values to draw
+        assert 0.5 * (found.ci[1] - found.ci[0]) == pytest.approx(t * found.estimate.variance**0.5, rel=0.1)
     assert made.v_zero[1][0] < made.v_zero[0] < made.v_zero[1][1]
 
 
