@@ -32,7 +32,7 @@ def test_sentences_are_whole_and_brief_ones_are_their_first_phrases():
 
 @pytest.mark.browser
 def test_wide_tables_fit_a_window_of_1300(browser, tmp_path):
-    sets = ["Set", "Valid", "v_15 [km/h]", "95 %", "CV [%]", "v_05 [km/h]", "First minor spin-down [km/h]",
+    sets = ["Set", "Valid", "Speed of 15 % slip [km/h]", "95 %", "CV [%]", "v_05 [km/h]", "First minor spin-down [km/h]",
             "Drop of the slip slope [km/h]", "Index", "95 % "]  # fmt: skip
     one = ["single detector", "1009.00", "1014.00", "front left, rear right", "partial", "71.0 … 88.0", "0.25",
            "-10.0 … 20.0", "98.0", "12", "minor spin-down"]  # fmt: skip

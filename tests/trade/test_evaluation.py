@@ -118,7 +118,9 @@ def test_another_slip_has_its_name_in_page_text_and_reasons():
     for shown in (report_text(report), page, json.dumps(trade_document(test, "week")["runs"])):
         assert "15 %" not in shown.partition("limits-section")[0].partition("Thresholds")[0]
         assert "the acceleration before 10 % is 0.80" in shown
-    assert "v_10 [km/h]" in page
+    assert "Speed of 10 % slip [km/h]" in page
+    assert "v_10 [km/h]" in report_text(report)
+    assert trade_document(test, "week")["runs"][0]["slip"] == 0.1
     assert "v_15" not in page
     columns = made.straight(v_15=64.5, slope=0.5)
     (found,) = straight_runs(made.signals(columns), made.FWD, limits.straight)

@@ -95,7 +95,8 @@ STRAIGHT = _document(
     "straight",
     "Straight aquaplaning: the speed of 15 % slip of every run, mean and index of every set.",
     (
-        _kmh("v_15", "speed of 15 % slip, or of `straight.slip` in use; of a censored run the speed that it is above"),
+        _kmh("v_15", "speed of the slip beside it; of a censored run the speed that it is above"),
+        f.number("slip", "-", "slip of that speed: `straight.slip` in use, by default 15 %"),
         f.flag("censored", "whether 15 % were not reached before the lane's end"),
         *(_kmh(f"v_{n}", f"speed of {int(n)} % slip; null where it was not reached") for n in ("05", "10", "50")),
         *(_kmh(f"v_{n}", f"speed at the first {what} on the lane; null without one") for n, what in SIGNS.items()),
@@ -103,7 +104,7 @@ STRAIGHT = _document(
                 f.text("", ""), null=True),
         f.text("reference", "signal behind the speeds: v_x, or the free wheel on the dry side", null=True),
         f.text("other_reference", "the other one; null without one", null=True),
-        _kmh("v_15_other", "speed of 15 % slip by the other reference"),
+        _kmh("v_15_other", "the same speed by the other reference"),
         *f.or_null(
             f.number("a_x", "m/s^2", "mean acceleration before the crossing, by the speed"),
             f.number("yaw_rate", "rad/s", "largest yaw rate on the lane before the crossing"),
@@ -136,7 +137,7 @@ CURVE = _document(
     ),
     (
         f.number("value", "", "the number that is compared, see `result`", null=True),
-        f.interval("ci95", "", "95 % interval, bootstrap over passes; null without one", null=True),
+        f.interval("ci95", "", "95 % interval, bootstrap over passes with Student's t; null without one", null=True),
         *(
             end for n, what in (
                 ("v_greatest", "speed of the greatest mean lateral acceleration; open beyond those driven"),

@@ -37,7 +37,7 @@ def trade_document(test: TradeTest, name: str) -> dict[str, Any]:
         "test": o.kind,
         "name": name,
         "by": list(o.keys),
-        "runs": [_run(e) for e in test.entries],
+        "runs": [_run(e, o.limits.straight.slip) for e in test.entries],
         "sets": [_set(s, test) for s in test.sets],
         "controls": [_control(c, o.kind) for c in test.controls],
     }
@@ -71,7 +71,7 @@ def _pair(ci: Interval, factor: float = 1.0) -> list[float] | None:
     return None if low is None and high is None else [low, high]
 
 
-def _run(e: Entry) -> dict[str, Any]:
+def _run(e: Entry, slip: float) -> dict[str, Any]:
     row: dict[str, Any] = {
         "log": e.log,
         "number": e.number,
@@ -82,7 +82,7 @@ def _run(e: Entry) -> dict[str, Any]:
         "reason": "; ".join(e.reasons) or None,
     }
     if isinstance(e.found, StraightRun):
-        row |= _straight(e, e.found)
+        row |= _straight(e, e.found, slip)
     elif isinstance(e.found, CurvePass):
         row |= _pass(e.found)
     else:
@@ -90,10 +90,10 @@ def _run(e: Entry) -> dict[str, Any]:
     return row | {"notes": list(e.found.notes)}
 
 
-def _straight(e: Entry, r: StraightRun) -> dict[str, Any]:
+def _straight(e: Entry, r: StraightRun, slip: float) -> dict[str, Any]:
     onset = {} if e.onset is None else e.onset.speeds
     return {
-        "v_15_kmh": _kmh(r.v), "censored": r.is_censored,
+        "v_15_kmh": _kmh(r.v), "slip": plain(slip), "censored": r.is_censored,
         **{f"{n}_kmh": _kmh(r.speeds.get(n, np.nan)) for n in LEVELS if n != "v_15"},
         **{f"v_{n}_kmh": _kmh(onset.get(n, np.nan)) for n in SIGNS},
         "onset_missing": None if e.onset is None else dict(e.onset.missing), "reference": r.reference or None,

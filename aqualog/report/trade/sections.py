@@ -38,8 +38,8 @@ _WIDTH = 110  # characters of a line of thresholds
 _TIED = "\N{NO-BREAK SPACE}"  # between a key, its value and its unit
 _FOOTER = (
     "Intervals: 95 %. Straight and braking: Student's t; censored runs by likelihood [tobin1958]. Curve: bootstrap "
-    "over passes. Index: Fieller [fieller1954], the control tyre linear between its sets by run order. Each interval "
-    "stands for itself: of twenty sets that equal the control, one is called different."
+    "over passes, widened by Student's t. Index: Fieller [fieller1954], the control tyre linear between its sets by "
+    "run order. Each interval stands for itself: of twenty sets that equal the control, one is called different."
 )
 
 
@@ -105,8 +105,10 @@ def run_name(e: Entry) -> str:
     return name if e.number == 1 else f"{name} ({e.number})"
 
 
-def _name(test: TradeTest) -> str:
-    return test.options.limits.straight.speed_name
+def _speed_head(test: TradeTest) -> tuple[str, str]:
+    """Return the head of the speed at the slip in use."""
+    own = test.options.limits.straight
+    return f"Speed of {own.level} slip [km/h]", f"{own.speed_name} [km/h]"
 
 
 def _valid(s: SetRow) -> int:
@@ -129,7 +131,7 @@ def _sets(test: TradeTest) -> Table:
     has_index = bool(test.controls)
     heads: list[str | tuple[str, str]] = ["Set", "Valid"]
     if test.options.kind == "straight":
-        heads += [f"{_name(test)} [km/h]", "95 %", "CV [%]", "v_05 [km/h]"]
+        heads += [_speed_head(test), "95 %", "CV [%]", "v_05 [km/h]"]
         heads += [("First minor spin-down [km/h]", "minor [km/h]"), ("Drop of the slip slope [km/h]", "slope [km/h]")]
     elif test.options.kind == "braking":
         heads += ["BFC", "95 %", "CV [%]"]
@@ -218,8 +220,8 @@ def _runs(test: TradeTest) -> Table:
     heads: list[str | tuple[str, str]] = ["Run", "Set", "Counts"]
     if test.options.kind == "straight":
         heads += [
-            f"{_name(test)} [km/h]",
-            (f"{_name(test)} by the other reference", "other"),
+            _speed_head(test),
+            ("By the other reference [km/h]", "other"),
             "v_05",
             "v_10",
             "v_50",
