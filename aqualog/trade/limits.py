@@ -38,6 +38,7 @@ class StraightLimits:
     slip_mean: float
     slip_lasts: float
     dry: float
+    dry_gap: float
     entry: float
     a_x_window: float
     a_x_share: float

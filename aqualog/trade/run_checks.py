@@ -50,7 +50,7 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
     """
     t, dt = signals.array("t"), signals.dt
     t_stop = float(np.interp(run.stop, np.arange(t.size), t))
-    until: BoolArray = (t >= run.span[0]) & (t <= t_stop)
+    until: BoolArray = (t >= min(run.span[0], float(t[int(run.stop)]))) & (t <= t_stop)
     reasons: list[str] = []
     notes: list[str] = []
     where = f"before {limits.level}" if run.is_crossing else "before the highest speed"
@@ -58,10 +58,11 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
     if gap > limits.lost:
         reasons.append(f"wheel speeds are missing for {gap:.2f} s {where}")
     if run.is_crossing and (came := t_stop - run.span[0]) < limits.entry:
-        reasons.append(f"{limits.level} came {max(came, 0.0):.2f} s after the lane began: the car entered it too fast")
+        when = f"{abs(came):.2f} s {'after' if came >= 0.0 else 'before'} the lane began"
+        reasons.append(f"{limits.level} came {when}: the car entered it too fast")
     if run.is_crossing and not np.isfinite(run.v[int(run.stop) : int(run.stop) + 2]).all():
         reasons.append("the speed is missing at the crossing")
-    begin = max(t_stop - limits.a_x_window, run.span[0] - limits.dry)
+    begin = max(t_stop - limits.a_x_window, run.span[0] - limits.dry_gap - limits.dry)
     a_x = _acceleration(t, run.v, (t > begin) & (t <= t_stop))
     if math.isnan(a_x):
         reasons.append(f"the acceleration {where} is not known")

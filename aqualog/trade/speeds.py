@@ -7,7 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.moments import Design
 from aqualog.core.records import BoolArray, FloatArray, Signals
+from aqualog.core.regression import estimate
 from aqualog.core.vehicle import Vehicle
 from aqualog.features.smoothing import earlier
 from aqualog.trade.lane import mean_over
@@ -19,7 +21,8 @@ _SHARE = 0.9  # of the lane on which a reference must have a value
 _V_LEAST = 3.0  # [m/s] below, no radius is learnt
 _LEARN_S = 10.0  # [s] before the lane from which the delay of v_x is learnt
 _MEAN_S = 0.5  # [s] of both speeds: noise in the wheel's rate would make the delay too small
-_BLOCK_S = 1.0  # [s] within which errors belong together
+_BLOCK_S = 2.0  # [s] within which errors belong together: a receiver's are correlated over half a second
+_MOST_BLOCKS = 200  # in a long drive blocks are longer: every pair of them is looked at
 _RATE_LEAST = 0.3  # [m/s²] of the rate's standard deviation: less may be noise
 _LATE_MOST = 0.5  # [s] more is no delay of a receiver
 _GAP_S = 0.1  # [s] a longer gap in v_x is remarked
@@ -66,7 +69,7 @@ def references(
     if has_free and seen > 0.0:
         known = _known(signals, on_lane, before)
         late, unsure = _late(v_x, by_wheel, known, signals.dt)
-        gap = longest_gap(v_x, on_lane | before) * signals.dt
+        gap = longest_gap(v_x, _stretch(on_lane | before)) * signals.dt
         filled = f"v_x is missing for {gap:.2f} s: the free wheel {free} fills the gap" if gap > _GAP_S else ""
         v_x = earlier(v_x, late if math.isfinite(late) else 0.0, signals.dt)
         apart = float(np.nanmedian(np.abs(v_x - by_wheel)[on_lane]))
@@ -90,10 +93,14 @@ def references(
 
 def _known(signals: Signals, on_lane: BoolArray, before: BoolArray) -> BoolArray:
     """Return the samples from which v_x and the free wheel are compared: to the lane's end, without brakes."""
-    places = np.flatnonzero(on_lane | before)
-    known: BoolArray = np.zeros_like(on_lane)
-    known[max(places[0] - round(_LEARN_S / signals.dt), 0) : places[-1] + 1] = True
-    return known & ~(signals.array("brake_pressure") > _BRAKES)
+    return _stretch(on_lane | before, round(_LEARN_S / signals.dt)) & ~(signals.array("brake_pressure") > _BRAKES)
+
+
+def _stretch(of: BoolArray, more: int = 0) -> BoolArray:
+    """Return all samples from the first to the last of some, and so many before."""
+    places, out = np.flatnonzero(of), np.zeros_like(of)
+    out[max(places[0] - more, 0) : places[-1] + 1] = True
+    return out
 
 
 def _at_ratio(v_x: FloatArray, by_wheel: FloatArray, known: BoolArray, dt: float) -> FloatArray:
@@ -106,16 +113,16 @@ def _at_ratio(v_x: FloatArray, by_wheel: FloatArray, known: BoolArray, dt: float
 
 def _late(v_x: FloatArray, by_wheel: FloatArray, known: BoolArray, dt: float) -> tuple[float, str]:
     """Return by how much v_x is late against the speed of a free wheel [s], or NaN and a note where that is open."""
-    late, sd = lateness(v_x, by_wheel, known, dt)
-    if abs(late) - 1.96 * sd > _LATE_MOST:
+    late, half = lateness(v_x, by_wheel, known, dt)
+    if abs(late) > _LATE_MOST:  # however wide the interval: so long a delay bends the fit
         return math.nan, f"v_x is late by {late:.1f} s against the free wheel: check the clocks (`aqualog align`)"
-    if not 1.96 * sd <= _LATE_OPEN:
+    if not half <= _LATE_OPEN:
         return math.nan, DELAY_OPEN
     return late, ""
 
 
 def lateness(v_x: FloatArray, by_wheel: FloatArray, known: BoolArray, dt: float) -> tuple[float, float]:
-    """Return by how much a speed is late against a wheel that rolls freely, and the standard deviation. [s]
+    """Return by how much a speed is late against a wheel that rolls freely, and half of its 95 % interval. [s]
 
     Parameters
     ----------
@@ -125,23 +132,21 @@ def lateness(v_x: FloatArray, by_wheel: FloatArray, known: BoolArray, dt: float)
         Samples without brakes, the wheel on dry road.
 
     Least squares of v_x over the wheel's speed, its third power (radii grow with v²) and its rate, of means over 0.5 s.
-    Errors within a second belong together. NaN with less than three seconds, or an even speed.
+    Errors within a block belong together: CR2 [bell2002], with its few degrees of freedom. NaN with less than three
+    blocks, or an even speed.
 
     Source: derived.
     """
     v, w = (mean_over(x, _MEAN_S, dt) for x in (v_x, by_wheel))
     rate = np.gradient(w, dt)
-    usable = known & np.isfinite(v + w + rate) & (v > _V_LEAST)
-    y, w, rate = v[usable], w[usable], rate[usable]
+    place = np.flatnonzero(known & np.isfinite(v + w + rate) & (v > _V_LEAST))
+    y, w, rate = v[place], w[place], rate[place]
     if y.size * dt < 3.0 * _BLOCK_S or rate.std() < _RATE_LEAST:
         return math.nan, math.nan
-    x = np.column_stack([w, w**3 / w.max() ** 2, -rate * (y.sum() / w.sum())])
-    inverse = np.linalg.pinv(x.T @ x)
-    solution = inverse @ (x.T @ y)
-    block = np.flatnonzero(usable) // max(1, round(_BLOCK_S / dt))
-    pull = x * (y - x @ solution)[:, None]
-    sums = np.array([pull[block == b].sum(axis=0) for b in np.unique(block)]) @ inverse
-    return float(solution[2]), float(np.linalg.norm(sums[:, 2]))
+    x = np.array([w, w**3 / w.max() ** 2, -rate * (y.sum() / w.sum())])
+    block = place // max(round(_BLOCK_S / dt), v_x.size // _MOST_BLOCKS, 1)
+    fit = estimate(Design(x, y, block, place, (False,) * 3, (False,) * 3))
+    return float(fit.value[2]), float(fit.half[2])
 
 
 def _free(

@@ -42,8 +42,8 @@ class StraightRun:
     reference, other : str
         `v_x`, or the dry free wheel (`omega_rr`); empty where there is no other.
     v_bound : float
-        Highest speed on the lane if 15 % were not reached, by the reference: the speed of 15 % lies above. [m/s] Else
-        NaN.
+        Highest speed on the lane, so long before its end that 15 % could still last, if they were not reached, by the
+        reference: the speed of 15 % lies above. [m/s] Else NaN.
     reasons : tuple of str
         Why the run is not valid, each a sentence without a full stop.
     notes : tuple of str
@@ -142,7 +142,8 @@ def straight_run(
         return replace(bare, reasons=lacking)
     t, dt = signals.array("t"), signals.dt
     on_lane: BoolArray = (t >= span[0]) & (t <= span[1])
-    before: BoolArray = (t >= span[0] - limits.dry) & (t < span[0])
+    dry_end = span[0] - limits.dry_gap
+    before: BoolArray = (t >= dry_end - limits.dry) & (t < dry_end)
     if not on_lane.any():
         what = f"the lane ({span[0]:.1f} to {span[1]:.1f} s) lies outside the log ({t[0]:.1f} to {t[-1]:.1f} s)"
         return replace(bare, reasons=(what,))
@@ -157,14 +158,18 @@ def straight_run(
     raw, ratio = slip_of(signals.array(f"omega_{wet}"), signals.array(f"omega_{dry}"), yaw_term, before)
     if not math.isfinite(ratio) or before.sum() * dt < 0.5 * limits.dry:
         what = (
-            f"less than {0.5 * limits.dry:g} s of dry road with wheel speeds, {limits.dry:g} s before the lane needed"
+            f"less than {0.5 * limits.dry:g} s of dry road with wheel speeds; {limits.dry:g} s needed, up to "
+            f"{limits.dry_gap:g} s before the lane"
         )
         return replace(bare, wet_side=side, reasons=(what,), notes=notes)
     slip, lasts = mean_over(raw, limits.slip_mean, dt), max(1, round(limits.slip_lasts / dt))
     levels = {n: crossing(slip, on_lane, limits.slip if n == "v_15" else s, lasts) for n, s in LEVELS.items()}
     at = levels["v_15"]
-    highest = int(np.argmax(np.where(on_lane & np.isfinite(speeds.own), speeds.own, -np.inf)))
-    is_reached = math.isfinite(at)
+    driven = np.where(on_lane & np.isfinite(speeds.own), speeds.own, -np.inf)
+    highest, is_reached = int(np.argmax(driven)), math.isfinite(at)
+    # a crossing nearer to the lane's end would not last, or its mean would hold dry road
+    lane, late = np.flatnonzero(on_lane), lasts + round(0.5 * limits.slip_mean / dt)
+    bound = float(driven[lane[: max(lane.size - late, 1)]].max())
     stop = at if is_reached else float(highest)
     other = crossing(-slip, on_lane & (np.arange(t.size) <= stop), limits.slip / (1.0 + limits.slip), lasts)
     wrong = f"the other driven wheel, on the {_OTHER[side]}, slipped by {limits.level}: wrong side declared?"
@@ -174,7 +179,7 @@ def straight_run(
     return StraightRun(
         {n: _read(speeds.own, k) for n, k in levels.items()},
         {n: _read(speeds.other, k) for n, k in levels.items()} if speeds.names[1] else {},
-        *speeds.names, math.nan if is_reached else float(speeds.own[highest]),
+        *speeds.names, math.nan if is_reached else bound,
         (*((wrong,) if math.isfinite(other) else ()), *seen.reasons),
         (*notes, *speeds.notes, *seen.notes), seen.a_x, seen.yaw_rate, ratio, _read(t, at), side, axle, span,
         (speeds.own[on_lane][::every], slip[on_lane][::every]), speeds.late, seen.wet,
@@ -218,14 +223,21 @@ def slip_of(
 def crossing(slip: FloatArray, on_lane: BoolArray, level: float, lasts: int) -> float:
     """Return the place of the first upward crossing of a level that lasts, in samples, linear between two; else NaN.
 
-    `lasts` counts the samples from the crossing on that must be at the level or above it. A slip that is there from
-    the lane's first sample on has no crossing, unless it falls again.
+    `lasts` counts the known samples from the crossing on that must be at the level or above it, up to the lane's end.
+    A slip that is there from the lane's first sample on has crossed before it: abrupt, or where the label is late.
     """
-    high = on_lane & (slip >= level)
-    below = np.isfinite(slip) & (slip < level)
-    for k in np.flatnonzero(high[1:] & below[:-1]) + 1:
-        if high[k : k + lasts].all() and k + lasts <= slip.size:
-            return float(k - 1 + (level - slip[k - 1]) / (slip[k] - slip[k - 1]))
+    known = np.flatnonzero(np.isfinite(slip))
+    on = np.flatnonzero(on_lane[known])
+    if not on.size:
+        return math.nan
+    s = slip[known[: on[-1] + 1]]
+    high = s >= level
+    for k in np.flatnonzero(high & ~np.concatenate([[False], high[:-1]])).tolist():
+        end = max(k + lasts, int(on[0]) + 1)
+        if high[k:end].all() and end <= s.size:
+            j = max(k - 1, 0)
+            share = (level - s[j]) / (s[k] - s[j]) if j < k else 0.0
+            return float(known[j] + share * (known[k] - known[j]))
     return math.nan
 
 

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from aqualog.campaign.delay import HALF_MAX, LATEST
-from aqualog.core.intervals import Z95
 from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.diagnose.channels import block_means, block_step, centre_line_speeds
@@ -43,10 +42,10 @@ def late_velocity(drive: Drive, v_x: FloatArray, dry: BoolArray) -> float:
     pressure = drive.columns.get("brake_pressure")
     rolls = drive.course.torque.sum(axis=0) >= 0.0 if pressure is None else pressure <= BRAKE_PRESSURE
     wheels = centre_line_speeds(drive.columns, drive.vehicle)[free].mean(axis=0)
-    late, sd = lateness(v_x, wheels, rolls & dry, drive.dt)
-    if not (Z95 * sd <= HALF_MAX and abs(late) <= LATEST):
+    late, half = lateness(v_x, wheels, rolls & dry, drive.dt)
+    if not (half <= HALF_MAX and abs(late) <= LATEST):
         return math.nan
-    return late if abs(late) > Z95 * sd else 0.0
+    return late if abs(late) > half else 0.0
 
 
 def offsets(drive: Drive, model: Model, dry: BoolArray) -> tuple[Term, ...]:

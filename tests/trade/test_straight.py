@@ -5,8 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from aqualog.trade.limits import Limits, defaults
+from aqualog.trade.speeds import lateness
 from aqualog.trade.straight import crossing, slip_of, straight_runs
 from tests.trade.made import FWD, KMH, RWD, signals, straight
 
@@ -57,13 +59,48 @@ def test_crossing_by_hand():
     assert crossing(slip, on, 0.15, 3) == pytest.approx(4.5)  # the first one does not last
     assert math.isnan(crossing(slip, on, 0.15, 4))
     assert math.isnan(crossing(slip, on & (np.arange(8) < 2), 0.15, 1))
+    late = np.arange(8) > 5
+    assert crossing(slip, late, 0.15, 3) == pytest.approx(4.5)  # it lasts into the lane
+    assert math.isnan(crossing(slip[:6], late[:6] | (np.arange(6) == 4), 0.15, 2))  # and not beyond its end
+    gap = np.array([0.0, 0.1, np.nan, 0.2, np.nan, 0.2, 0.2, 0.1])
+    assert crossing(gap, on, 0.15, 4) != crossing(gap, on, 0.15, 3) == pytest.approx(2.0)
+
+
+def labelled(late, **more):
+    """A run whose label begins late [s] behind the water's edge, where the slip is there at once."""
+    columns = straight(**more)
+    on = columns["on_water"] * (np.arange(1500) >= 300 + round(100 * late))
+    return columns | {"on_water": on, "water_depth_left": 7e-3 * on}
+
+
+@pytest.mark.parametrize(("late", "v_15"), [(0.0, 40.0), (0.1, 78.0), (0.3, 78.0)])
+def test_a_run_that_enters_beyond_the_level_is_not_above_its_highest_speed(late, v_15):
+    run = one(labelled(late, v_15=v_15, v_0=66.0))  # 80 km/h at the edge; abrupt, the slip's mean comes before it
+    assert not run.is_censored
+    assert not run.valid
+    assert "before the lane began: the car entered it too fast" in run.reasons[0]
+    assert run.v / KMH == pytest.approx(80.0, abs=0.3)
+    assert not any("yaw" in n for n in run.notes)
+
+
+@pytest.mark.parametrize("late", [0.1, 0.3])
+def test_a_late_label_takes_no_water_into_the_dry_second(late):
+    run = one(labelled(late, v_0=58.0))  # 72 km/h and 9 % at the edge
+    assert run.ratio == pytest.approx(1.0)
+    assert run.v / KMH == pytest.approx(78.0, abs=0.01)
+
+
+def test_a_crossing_too_near_to_the_end_of_the_lane_is_above_the_bound():
+    run = one(straight(v_15=115.3))  # 0.05 s before it, where 15 % cannot last
+    assert run.is_censored
+    assert run.v / KMH == pytest.approx(50 + 1.3 * 13.85 / KMH, abs=0.06)
 
 
 def test_a_run_that_ends_before_15_percent_is_censored_and_counts():
     run = one(straight(v_15=200.0))
     assert run.is_censored
     assert run.valid
-    assert run.v / KMH == pytest.approx((50 * KMH + 1.3 * 14.0) / KMH, abs=0.1)
+    assert run.v / KMH == pytest.approx(50 + 1.3 * 13.85 / KMH, abs=0.06)
 
 
 def test_acceleration_is_that_of_the_speed():
@@ -90,6 +127,20 @@ def test_a_delay_that_the_drive_does_not_show_stays():
     assert math.isnan(one(late(0.08, a=0.0)).late)
     assert "the delay of v_x is not known" in "; ".join(one(late(0.08, a=0.0)).notes)
     assert "check the clocks" in "; ".join(one(late(0.8)).notes)
+
+
+@pytest.mark.parametrize("tau", [0.02, 0.5])
+def test_the_interval_of_the_delay_holds_it(tau):
+    """Noise of a receiver is correlated, and few stretches show the delay."""
+    rng, t = np.random.default_rng(0), np.arange(1100) / 100.0
+    v = 18.0 + 1.3 * np.maximum(t - 4.0, 0.0) + 0.05 * np.sin(0.6 * np.pi * t)
+    keep, inside = math.exp(-0.01 / tau), 0
+    for _ in range(60):
+        noise = lfilter([0.03 * math.sqrt(1.0 - keep**2)], [1.0, -keep], rng.normal(size=1600))[500:]
+        wheel = v + rng.normal(0.0, 0.01, t.size)
+        found, half = lateness(np.interp(t - 0.08, t, v) + noise, wheel, np.ones(t.size, bool), 0.01)
+        inside += abs(found - 0.08) <= half
+    assert inside / 60 > 0.88
 
 
 def test_yaw_of_a_bent_line_is_taken_off():
@@ -167,7 +218,7 @@ def test_a_run_that_is_none_says_why(name):
 def test_a_throttle_that_is_let_go_behind_the_lane_costs_nothing():
     run = one(lifted(8.0, late=0.1, lane_end=8.05))
     assert run.valid, run.reasons
-    assert run.v / KMH == pytest.approx(87.44, abs=0.1)
+    assert run.v / KMH == pytest.approx(50 + 1.3 * 7.9 / KMH, abs=0.06)
 
 
 GAPS = {"crossing": (583, 613), "long": (540, 640), "early": (400, 450), "after": (650, 750), "before": (210, 310)}
