@@ -65,8 +65,9 @@ class Validation(Result):
             "plots": table(
                 plots,
                 "y x unit x_unit points within within_share judged_s x_offset x_gain y_offset y_gain tolerance_from "
-                "worst_drive worst_by worst_start_s worst_end_s",
-                text=("y", "x", "unit", "x_unit", "tolerance_from", "worst_drive"), whole=("points", "within"),
+                "worst_drive worst_by worst_start_s worst_end_s repeated_drives t_factor scatter noise",
+                text=("y", "x", "unit", "x_unit", "tolerance_from", "worst_drive"),
+                whole=("points", "within", "repeated_drives"),
             ),
             "limits": table(
                 limits, "condition valid not_above_kmh driven_low_kmh driven_high_kmh within_share judged_s",

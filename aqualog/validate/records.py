@@ -11,8 +11,8 @@ from aqualog.core.records import BoolArray, FloatArray
 from aqualog.validate.boundary import Tolerance
 
 __all__ = [
-    "ABSCISSAE", "AGREED", "PLOTS", "SIGNALS", "Judged", "Kind", "Limit", "Plan", "Plot", "Rated", "Trace", "Validity",
-    "Worst",
+    "ABSCISSAE", "AGREED", "PLOTS", "SIGNALS", "Judged", "Kind", "Limit", "Plan", "Plot", "Rated", "Spread", "Trace",
+    "Validity", "Worst",
 ]  # fmt: skip
 
 
@@ -181,9 +181,19 @@ class Rated:
     delay_s: float
 
 
+class Spread(NamedTuple):
+    """What drives that repeat each other give: y_offset = t_factor sqrt(scatter² + noise²). [unit of the signal]"""
+
+    y_offset: float
+    repeated_drives: int | None
+    t_factor: float
+    scatter: float
+    noise: float
+
+
 @dataclass(frozen=True, slots=True)
 class Validity:
-    """What was found. `share` of the judged time with all signals within; `spread` signal -> eps_y of repetitions."""
+    """What was found. `share` of the judged time with all signals within; `spread` of signals, from repetitions."""
 
     traces: tuple[Trace, ...]
     plan: Plan
@@ -194,7 +204,7 @@ class Validity:
     worst: Worst | None
     limits: tuple[Limit, ...]
     rated: tuple[Rated, ...]
-    spread: Mapping[str, float]
+    spread: Mapping[str, Spread]
     notes: tuple[str, ...] = ()
 
     @property

@@ -20,7 +20,7 @@ from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 from aqualog.validate.boundary import beyond
 from aqualog.validate.rating import LEAST_SAMPLES, rating
-from aqualog.validate.records import PLOTS, SIGNALS, Judged, Limit, Plan, Plot, Rated, Trace, Validity, Worst
+from aqualog.validate.records import PLOTS, SIGNALS, Judged, Limit, Plan, Plot, Rated, Spread, Trace, Validity, Worst
 from aqualog.validate.sensors import late_velocity, offsets
 from aqualog.validate.spread import LEAST_DRIVES, spread_of
 
@@ -66,7 +66,7 @@ def validate(
     for name, signals in drives:
         progress(f"{name}: simulating")
         traces.append(trace_of(prepare(signals, vehicle, name, judges_afloat=True), model, signals))
-    spread = {s: w for s in SIGNALS if s not in plan.given and math.isfinite(w := spread_of(traces, s))}
+    spread = {s: w for s in SIGNALS if s not in plan.given and (w := spread_of(traces, s))}
     plan = replace(plan, plots=tuple(_widened(p, spread) for p in plan.plots))
     progress("judging")
     off = {p: [_off(t, p) for t in traces] for p in plan.plots if p.x == "t" and any(p.y in t.measured for t in traces)}
@@ -155,11 +155,11 @@ def _wet(drive: Drive, signals: Signals) -> BoolArray:
     return wet
 
 
-def _widened(plot: Plot, spread: dict[str, float]) -> Plot:
+def _widened(plot: Plot, spread: dict[str, Spread]) -> Plot:
     """The plot with the tolerance that the repetitions give, if they do."""
     if plot.y not in spread:
         return plot
-    return replace(plot, tolerance=replace(plot.tolerance, y_offset=spread[plot.y], y_gain=0.0))
+    return replace(plot, tolerance=replace(plot.tolerance, y_offset=spread[plot.y].y_offset, y_gain=0.0))
 
 
 # --- over time -------------------------------------------------------------------------------------------------------

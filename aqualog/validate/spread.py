@@ -11,7 +11,7 @@ import numpy as np
 from aqualog.core.intervals import Z95, student_quantile
 from aqualog.core.records import FloatArray
 from aqualog.trade.control import satterthwaite
-from aqualog.validate.records import Trace
+from aqualog.validate.records import Spread, Trace
 
 __all__ = ["LEAST_DRIVES", "spread_of"]
 
@@ -26,27 +26,27 @@ TOGETHER_S = 1.0  # [s] within which errors belong together: a velocity of 10 Hz
 LATE_S = 10.0  # [s] by which one recording may begin later than another
 
 
-def spread_of(traces: Sequence[Trace], signal: str) -> float:
-    """eps_y by drives that repeat each other; NaN where they do not.
+def spread_of(traces: Sequence[Trace], signal: str) -> Spread | None:
+    """eps_y by drives that repeat each other; None where they do not.
 
     Parameters
     ----------
     traces : sequence of Trace
         Of one car.
     signal : str
-        In all of them, else the result is NaN.
+        In all of them, else there is no result.
 
     Returns
     -------
-    float
-        t sqrt(s_b² + s_n²) [unit of the signal]. s_b is the scatter between the drives' means of measured minus
-        simulated in cells of speed (5 km/h), dry and wet apart; what the inputs of a drive explain is not in it, an
-        error that all drives share neither. s_n is the noise, from differences over a second, and larger for each other
-        signal: all must be within at once [bonferroni1936]. t is the 97.5 % quantile of Student's t with the degrees of
-        freedom of the sum [satterthwaite1946]: s_b has (drives - 1), s_n one per second.
+    Spread, optional
+        y_offset = t sqrt(s_b² + s_n²) [unit of the signal]. s_b is the scatter between the drives' means of measured
+        minus simulated in cells of speed (5 km/h), dry and wet apart; what the inputs of a drive explain is not in it,
+        an error that all drives share neither. s_n is the noise, from differences over a second, and larger for each
+        other signal: all must be within at once [bonferroni1936]. t is the 97.5 % quantile of Student's t with the
+        degrees of freedom of the sum [satterthwaite1946]: s_b has (drives - 1), s_n one per second.
     """
     if len(traces) < LEAST_DRIVES or any(signal not in t.measured for t in traces) or not _repeat(traces):
-        return math.nan
+        return None
     cells: dict[tuple[bool, int], list[tuple[float, int]]] = {}
     squares, pairs, judged = 0.0, 0, 0
     for trace in traces:
@@ -65,14 +65,13 @@ def spread_of(traces: Sequence[Trace], signal: str) -> float:
                     cells.setdefault((wet, c), []).append((float(own.mean()), own.size))
     shared = [x for x in cells.values() if len(x) >= LEAST_DRIVES]
     if not shared or sum(n for x in shared for _, n in x) < LEAST_SHARE * judged or not pairs:
-        return math.nan
+        return None
     between = sum(float(np.var([m for m, _ in x])) * len(x) for x in shared) / sum(len(x) - 1 for x in shared)
     at_once = NormalDist().inv_cdf(1.0 - 0.025 / len(traces[0].measured)) / Z95
     noise, seconds = at_once**2 * squares / pairs, pairs * traces[0].step / TOGETHER_S
-    if not between + noise:
-        return 0.0
-    dof = satterthwaite((between, noise), (len(traces) - 1, max(seconds, 1.0)))
-    return student_quantile(0.975, dof) * math.sqrt(between + noise)
+    own = (len(traces) - 1.0, max(seconds, 1.0))
+    t = student_quantile(0.975, satterthwaite((between, noise), own) if between + noise else own[0])
+    return Spread(t * math.sqrt(between + noise), len(traces), t, math.sqrt(between), math.sqrt(noise))
 
 
 def _repeat(traces: Sequence[Trace]) -> bool:

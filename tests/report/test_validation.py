@@ -9,7 +9,7 @@ import pytest
 from aqualog.report.text import report_text
 from aqualog.report.validation import validation_document, validation_report
 from aqualog.validate.boundary import Tolerance
-from aqualog.validate.records import Judged, Limit, Plan, Plot, Rated, Trace, Validity, Worst
+from aqualog.validate.records import Judged, Limit, Plan, Plot, Rated, Spread, Trace, Validity, Worst
 
 PLOT = Plot("a_x", "t", Tolerance(0.1, 0.0, 0.15, 0.05))
 WORST = Worst("d.mf4", "a_x", -0.12, 4.1, 6.3)
@@ -64,6 +64,18 @@ def test_of_several_drives_the_worst_is_named():
 def test_limits_in_words(limit, told):
     asked = "" if limit.is_valid else ", where 95 % of the time is asked for"
     assert document(replace(FOUND, limits=(limit,)))["sentence"].endswith(f"{told}{asked}.")
+
+
+def test_what_the_repetitions_give_stands_beside_the_result():
+    found = replace(FOUND, spread={"a_x": Spread(0.15, 3, 4.303, 0.031, 0.015)})
+    made = document(found)
+    own = ("repeated_drives", "t_factor", "scatter", "noise")
+    assert [made["plots"][0][k] for k in own] == [3, 4.303, 0.031, 0.015]
+    assert [document()["plots"][0][k] for k in own] == [None] * 4
+    text = report_text(validation_report(found, made))
+    assert "0.15 m/s² = t √(s_b² + s_n²): t 4.30, scatter between 3 drives s_b 0.031, noise s_n 0.015" in text
+    assert "Fewer repetitions make wider boundaries" in text
+    assert "epetition" not in report_text(validation_report(FOUND, document()))
 
 
 def test_no_effect_is_no_reason_why_not():

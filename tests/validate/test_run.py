@@ -12,10 +12,10 @@ from aqualog.model.programme import SEDAN
 from aqualog.model.scenario import Lane, Scenario
 from aqualog.model.simulate import simulate
 from aqualog.model.term import Model
+from aqualog.validate import spread
 from aqualog.validate.boundary import Tolerance
 from aqualog.validate.records import PLOTS, SIGNALS, Plan, Plot, Trace
 from aqualog.validate.run import _limit, _pieces, validate
-from aqualog.validate.spread import spread_of
 
 SPEED = ((0.0, 18.0), (10.0, 18.0), (25.0, 32.0), (35.0, 32.0), (50.0, 20.0), (60.0, 20.0))
 CAR = replace(SEDAN, given=frozenset({"drivetrain", "mass"}))
@@ -113,6 +113,11 @@ def judged_trace(trace):
     return _over_time(plot, [trace], [_off(trace, plot)]).worst
 
 
+def spread_of(traces, signal):
+    found = spread.spread_of(traces, signal)
+    return found.y_offset if found else math.nan
+
+
 def repeated(offsets, noise):
     n = 500
     rng = np.random.default_rng(2)
@@ -128,6 +133,8 @@ def test_spread_of_repetitions():
     # means 0, 0.1, 0.2: standard deviation 0.1, and t(0.975, 2) = 4.303; an error that all share is not in it
     assert spread_of(repeated((0.0, 0.1, 0.2), 0.0), "a_x") == pytest.approx(4.303 * 0.1, rel=1e-3)
     assert spread_of(repeated((5.0, 5.1, 5.2), 0.0), "a_x") == pytest.approx(4.303 * 0.1, rel=1e-3)
+    own = spread.spread_of(repeated((0.0, 0.1, 0.2), 0.0), "a_x")
+    assert own[1:] == (3, pytest.approx(4.303, rel=1e-3), pytest.approx(0.1), 0.0)
     assert math.isnan(spread_of(repeated((0.0, 0.1), 0.0), "a_x"))
     assert math.isnan(spread_of(repeated((0.0, 0.1, 0.2), 0.0), "a_y"))
     elsewhere = [
@@ -170,11 +177,11 @@ def test_three_drives_on_other_roads_are_no_repetitions():
 def test_repeated_drives_give_the_tolerance_unless_the_user_does():
     drives = [drive(seed) for seed in (1, 2, 3)]
     found = judged(*drives)
-    assert 0.01 < found.spread["a_x"] < 0.3
+    assert 0.01 < found.spread["a_x"].y_offset < 0.3
     (a_x,) = (j for j in found.judged if j.plot.name == "a_x over t")
-    assert a_x.plot.tolerance.y_offset == found.spread["a_x"]
+    assert a_x.plot.tolerance.y_offset == found.spread["a_x"].y_offset
     assert a_x.share > 0.99
-    assert found.spread["slip_fl"] < 0.08
+    assert found.spread["slip_fl"].y_offset < 0.08
     assert all(j.share > 0.98 for j in found.judged if j.plot.x == "t")
     # a file without [tie_rod] says nothing of their forces
     assert sum("tie-rod forces are left out" in n for n in found.notes) == 3

@@ -401,6 +401,12 @@ _PLOT = (
     number("y_gain", "-", "the same"),
     text("tolerance_from", "where eps_y comes from", ("repetitions", "file", "built in")),
     obj("worst", "the worst stretch; null without one", _WORST, null=True),
+    count("repeated_drives", "drives that repeat each other; this and the next three null without", null=True),
+    *or_null(
+        number("t_factor", "-", "y_offset = t_factor √(scatter² + noise²), Student's t: larger with fewer drives"),
+        number("scatter", "unit of y", "standard deviation between the drives, s_b"),
+        number("noise", "unit of y", "noise, s_n"),
+    ),
 )
 _RATING = (
     text("signal", "the signal", tuple(SIGNALS)),
