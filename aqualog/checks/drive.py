@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from aqualog.checks.doubts import Doubt
+from aqualog.checks.doubts import Change, Doubt
 from aqualog.checks.driven import LEAST_DRIVE, STILL, drives, shown
 from aqualog.checks.slip import AXLE, slip_doubts
-from aqualog.checks.windows import EXTRA, Windows
+from aqualog.checks.windows import EXTRA, PRESSURES, Windows
 from aqualog.core.intervals import half_width
 from aqualog.core.notation import AXLES
 from aqualog.core.records import BoolArray, FloatArray, Remark
@@ -28,12 +28,16 @@ ROLLING = -0.3  # [m/s^2] a car that slows down less is not braked
 PUSHED = 0.2  # [m/s^2] by the torque: driving, and surely no braking that the torque does not hold
 BLOCK = 20  # windows, 10 s: grade and wind last as long
 LEAST_BLOCKS = 10
+PASSENGER = 2500.0  # [kg] of a car whose tyres have at most `HIGHEST` (K)
+HIGHEST = 3.5e5  # [Pa] of a passenger car's tyres, gauge; usual are 1.5 to 3.5 bar (K)
+AIR = 101_325.0  # [Pa]
 SPREAD = 0.2  # [m/s^2] standard deviation of what the torque gives: less shows no gain
 
 
 def drive_doubts(windows: Windows) -> Iterator[Doubt]:
     """Yield what is wrong with the torques or with the vehicle file."""
     yield from _brakes(windows)
+    yield from _tyre_pressures(windows)
     gains = list(_gain(windows))
     yield from gains or _resistance(windows)
     wrong = list(_drivetrain(windows))
@@ -59,6 +63,20 @@ def _brakes(windows: Windows) -> Iterator[Doubt]:
     what = f"brake_pressure is {1e-5 * middle:.1f} bar or more for half of the time in which the car does not slow down"
     advice = "check its channel, unit and offset: what a braked wheel does is no aquaplaning"
     yield Doubt("channel", ("brake_pressure",), what, advice, value=middle)
+
+
+def _tyre_pressures(windows: Windows) -> Iterator[Doubt]:
+    """Doubt pressures that are a passenger car's only with that of the air; of a heavier vehicle nobody knows."""
+    car = windows.vehicle
+    known = {s: x[np.isfinite(x)] for s in PRESSURES if s in windows for x in [windows[s]]}
+    middle = {s: float(np.median(x)) for s, x in known.items() if x.size}
+    high = {s: p for s, p in middle.items() if HIGHEST < p <= HIGHEST + AIR}
+    if not high or len(high) < len(middle) or "mass" not in car.given or car.mass > PASSENGER:
+        return
+    most = max(high.values())
+    what = f"the tyre pressures look absolute: up to {1e-5 * most:.1f} bar, where cars have 1.5 to 3.5 bar gauge"
+    advice = "if the sensors count the air's pressure, take it off; a loaded car may have more than is usual"
+    yield Doubt("channel", tuple(high), what, advice, ({s: Change(offset=AIR) for s in high},), most)
 
 
 def _resistance(windows: Windows) -> Iterator[Doubt]:

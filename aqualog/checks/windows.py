@@ -11,12 +11,15 @@ from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["EXTRA", "Gather", "Windows"]
+__all__ = ["EXTRA", "PRESSURES", "Gather", "Windows"]
 
 WINDOW = 0.5  # [s] over which changes are compared: longer than latencies, shorter than manoeuvres
 UNLIKE = 0.2  # [-] share by which wheels differ neither in curves nor by their radii (K)
 EXTRA = "delta_a_x"  # what `detect` adds: the measure of the resistance, where it is judged
-_AS_THEY_ARE = ("v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "brake_pressure", "latitude", "longitude")
+PRESSURES = tuple(f"pressure_{w}" for w in WHEELS)
+_AS_THEY_ARE = (
+    "v_x", "a_x", "a_y", "yaw_rate", "steer_angle", "brake_pressure", "latitude", "longitude", *PRESSURES,
+)  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)

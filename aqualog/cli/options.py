@@ -188,7 +188,7 @@ OPTIONS: dict[str, tuple[Any, Any]] = {
     "fix": _option(
         list[str] | None, None, "--fix", metavar="KEY=VALUE",
         help="What is known: mass=KG, torque_gain=X, drag_area=M2 or rolling_resistance=X; with --wet tread=MM, "
-        "pressure=BAR and depth=MM. May be repeated.",
+        "pressure=BAR (gauge) and depth=MM. May be repeated.",
     ),
     "wet": _flag("Fit how the tyres float, to passes over water.", "--wet"),
     "accept": _flag("Take the drives' values also where the vehicle file says something else.", "--accept"),

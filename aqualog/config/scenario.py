@@ -43,7 +43,7 @@ _ALL = [
     _text("", "tyre", "worn_summer", f"{', '.join(TYRES)}, or a table: a `base` and what differs from it, SI"),
     _text("", "tyre_front", None, "tyre of the front axle, in place of `tyre`"),
     _text("", "tyre_rear", None, "tyre of the rear axle, in place of `tyre`"),
-    _number("", "pressure_bar", "bar", 1.9, 0.5, 10.0, "inflation pressure"),
+    _number("", "pressure_bar", "bar", 1.9, 0.5, 10.0, "gauge pressure of the tyres"),
     _number("", "pressure_front_bar", "bar", None, 0.5, 10.0, "of the front axle, in place of `pressure_bar`"),
     _number("", "pressure_rear_bar", "bar", None, 0.5, 10.0, "of the rear axle, in place of `pressure_bar`"),
     _number("", "load_front_kg", "kg", 0.0, 0.0, 20000.0, "load over the front axle, at most the car's own mass"),

@@ -62,7 +62,7 @@ _ALL = [
     Symbol("latitude", "deg", "latitude", -90.0, 90.0),
     Symbol("longitude", "deg", "longitude", -180.0, 180.0),
     Symbol("altitude", "m", "height above sea level", -500.0, 9000.0),
-    *_wheels("pressure", "Pa", "tyre inflation pressure", 0.0, 2e6),
+    *_wheels("pressure", "Pa", "gauge pressure of the tyre: above that of the air", 0.0, 2e6),
     Symbol("ambient_temperature", "K", "ambient temperature", 200.0, 340.0),
 ]
 

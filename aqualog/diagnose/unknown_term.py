@@ -67,7 +67,7 @@ COORDINATES = {
     "since_braking": Coordinate("time since braking", "s", "s"),
     "angle": Coordinate("angle of the wheel", "rad", "turns", 0.5 / math.pi),
     "depth": Coordinate("water depth", "m", "mm", 1e3),  # of a campaign's runs, like the next ones
-    "pressure": Coordinate("tyre pressure", "Pa", "bar", 1e-5),
+    "pressure": Coordinate("gauge pressure", "Pa", "bar", 1e-5),
     "load": Coordinate("load", "kg", "kg"),
 }
 _CHANNELS = {

@@ -165,7 +165,7 @@ def calibrate(
         Without it that of the first drive; one of them must be given, for it says which axle is driven.
     fix : mapping, optional
         Values that are known: `mass` [kg], `torque_gain` [-], `drag_area` [m²], `rolling_resistance` [-]. With `wet`:
-        `tread` [mm] and `pressure` [bar], which must be given, and `depth` of the water [mm] where the logs lack it.
+        `tread` [mm] and `pressure` [bar, gauge], which must be given, and `depth` of the water [mm] where logs lack it.
     accept : bool
         Take estimates in place of values that the vehicle file gives and their intervals exclude; else those stay.
     wet : bool

@@ -54,7 +54,7 @@ _TEXTS = ("id", "quantity", "path", "mark", "source", "where")
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """Water [mm], tread [mm], inflation pressure [bar], wheel load [N], and for some quantities a speed. [km/h]
+    """Water [mm], tread [mm], gauge pressure [bar], wheel load [N], and for some quantities a speed. [km/h]
 
     `aspect`: width over length of the contact at that load and pressure, if it is not a modern car tyre's. [-]
     """

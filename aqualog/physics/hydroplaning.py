@@ -34,7 +34,7 @@ SPIN_UP_RATIO = 7.7 / 9.0  # spin-up over spin-down speed: a wheel that has stop
 def horne_speed(p: FloatArray) -> FloatArray:
     """Spin-down speed of a rotating wheel on a flooded road, v = 9 sqrt(p) kn with p in psi. [m/s]
 
-    `p` inflation pressure, > 0 [Pa]. 180, 200, 220, 240 kPa give 85, 90, 94, 99 km/h. Valid for flooded roads, water
+    `p` gauge pressure, > 0 [Pa]. 180, 200, 220, 240 kPa give 85, 90, 94, 99 km/h. Valid for flooded roads, water
     deeper than the grooves, and tyres of aircraft. By the aspect of the contact, width over length, it is 7.95
     sqrt(p / FAR) mph: the same at 0.59. A longer contact floats later.
 
@@ -60,7 +60,7 @@ def gallaway_speed(
 ) -> FloatArray:
     """Hydroplaning speed after Gallaway: v = SD^0.04 P^0.3 (TD + 1)^0.06 A mph. [m/s]
 
-    `h_w` water film, > 0 [m]; `p` inflation pressure [Pa]; `tread_depth`, `texture_depth` mean of the road's [m];
+    `h_w` water film, > 0 [m]; `p` gauge pressure [Pa]; `tread_depth`, `texture_depth` mean of the road's [m];
     `spin_down` criterion, loss of wheel speed [%].
 
     P in psi, TD in 1/32 inch, A = max(10.409 / h^0.06 + 3.507, (28.952 / h^0.06 - 7.817) MTD^0.14), inch. 220 kPa,
@@ -77,7 +77,7 @@ def gallaway_speed(
 def usf_speed(h_w: FloatArray, p: FloatArray, F_z: FloatArray) -> FloatArray:
     """Hydroplaning speed of the USF regression, v = W^0.2 p^0.5 (0.82 / h^0.06 + 0.49) km/h. [m/s]
 
-    `h_w` water film, > 0 [m]; `p` inflation pressure [Pa]; `F_z` wheel load [N]. W in N, p in kPa, h in mm.
+    `h_w` water film, > 0 [m]; `p` gauge pressure [Pa]; `F_z` wheel load [N]. W in N, p in kPa, h in mm.
 
     Source: as commonly quoted (K) from [gunaratne2012].
     """

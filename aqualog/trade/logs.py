@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 from polars.exceptions import PanicException
 
 from aqualog.align.load import load_signals
@@ -32,6 +33,7 @@ __all__ = ["Measured", "Request", "measure_log", "measure_logs", "measure_signal
 
 _DEPTHS = ("water_depth_left_mm", "water_depth_mm")
 _OPTIONAL = {"straight": frozenset({"v_x"})}  # mapped signals that a log may lack: another one stands in
+_AIR = (0.8e5, 1.3e5)  # [Pa] that of the air, with what driving warms a tyre by
 _HERE = 4  # for so few logs no processes are started
 
 Report = Callable[[int, int, int], None]
@@ -80,7 +82,20 @@ def measure_signals(signals: Signals, vehicle: Vehicle, run: Run | None, request
     if run is not None:
         found = tuple(_of_planned_depth(signals, r, run, request.limits.set.depth_share) for r in found)
         found = tuple(_of_planned_lane(signals, r, lane) for r in found)
-    return Measured(found, onset, signals.start_ns, signals.quality.notes)
+    return Measured(found, onset, signals.start_ns, (*signals.quality.notes, *_absolute(signals, run)))
+
+
+def _absolute(signals: Signals, run: Run | None) -> tuple[str, ...]:
+    """Return a doubt where the log's tyre pressures are above the campaign's by about that of the air."""
+    off = [
+        float(np.nanmedian(x)) - 1e5 * _number(run.values, f"pressure_{axle}_bar")
+        for axle in ("front", "rear") if run is not None for s in "lr"
+        if np.isfinite(x := signals.array(f"pressure_{axle[0]}{s}")).any()
+    ]  # fmt: skip
+    if not off or not all(_AIR[0] < d < _AIR[1] for d in off):
+        return ()
+    by = 1e-5 * sum(off) / len(off)
+    return (f"tyre pressures in the log are {by:.1f} bar above the campaign's: absolute? Both should be gauge",)
 
 
 def _of_planned_depth(signals: Signals, record: Record, run: Run, share: float) -> Record:

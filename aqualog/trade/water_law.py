@@ -23,7 +23,7 @@ __all__ = ["FITTED", "KNOWN", "WaterFit", "calibrate_wet", "check_known", "fit_w
 KNOWN: Mapping[str, tuple[float, float, str]] = {
     "tread": (0.0, 20.0, "mm"), "pressure": (0.5, 10.0, "bar"), "depth": (0.05, 50.0, "mm"),
 }  # fmt: skip
-"""What can be given as known of the passes, with bounds and unit; tread and pressure must be."""
+"""What can be given as known of the passes, with bounds and unit; tread and gauge pressure must be."""
 
 FITTED = ("v_anchor", "contact_exponent")
 """Numbers that the passes of one tyre in one state can show; the others are those of the published figures."""

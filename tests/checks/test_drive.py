@@ -139,6 +139,19 @@ def test_beyond_the_limits_of_the_vehicle_file_the_map_is_in_doubt():
     assert "mass =" not in remark.sentence
 
 
+@pytest.mark.parametrize(
+    ("bar", "car", "is_named"),
+    [(3.9, CAR, True), (2.6, CAR, False), (6.0, CAR, False), (3.9, replace(CAR, mass=3400.0), False),
+     (3.9, replace(CAR, given=frozenset()), False)],
+)  # fmt: skip
+def test_tyre_pressures_that_look_absolute(bar, car, is_named):
+    columns = made(seconds=30.0)
+    pressures = {f"pressure_{w}": np.full(columns["v_x"].size, 1e5 * bar) for w in ("fl", "fr", "rl", "rr")}
+    remarks = [r for r in look(signals({**columns, **pressures}), car) if "absolute" in r.what]
+    assert len(remarks) == is_named
+    assert not is_named or all("offset = -1013" in line for line in remarks[0].lines)
+
+
 @pytest.mark.parametrize(("offset", "is_named"), [(0.0, False), (2.5e5, False), (3.5e5, True), (50e5, True)])
 def test_a_brake_that_acts_on_a_car_that_does_not_slow_down(offset, is_named):
     columns = made(seconds=30.0)

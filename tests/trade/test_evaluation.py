@@ -5,6 +5,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from aqualog.book.topics import DOCS
@@ -142,6 +143,17 @@ def test_water_of_another_depth_than_planned(told, counts):
     (run,) = measure_signals(drive, made.FWD, planned, Request("straight", defaults(), with_onset=False)).found
     assert run.valid == counts
     assert counts or run.reasons == ("7.0 mm of water in the log, 4.0 mm in the campaign",)
+
+
+@pytest.mark.parametrize(("bar", "notes"), [(3.3, 1), (2.5, 0)])
+def test_tyre_pressures_that_are_above_the_campaign_by_that_of_the_air(bar, notes):
+    drive = made.signals(made.straight() | {"pressure_fl": np.full(1500, 1e5 * bar)})
+    planned = Run((Path("a.mf4"),), Path("car.toml"), None, None, {"pressure_front_bar": 2.2})
+    found = measure_signals(drive, made.FWD, planned, Request("straight", defaults(), with_onset=False))
+    assert found.found[0].valid
+    assert [n for n in found.notes if "1.1 bar above the campaign's: absolute?" in n] == list(found.notes)[
+        -notes:
+    ] * notes
 
 
 @pytest.mark.parametrize("kind", ["straight", "curve", "braking"])

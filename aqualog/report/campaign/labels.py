@@ -13,16 +13,17 @@ __all__ = ["file_name", "group_text", "key_title", "value_text"]
 
 _STEM = 60  # characters of a name that stay in a file name
 _TITLES = {
-    "pressure_front_bar": "pressure, front", "pressure_rear_bar": "pressure, rear", "water_depth_mm": "water depth",
-    "water_depth_left_mm": "water depth, left track", "load_front_kg": "load, front", "load_rear_kg": "load, rear",
-    "tread_depth_mm": "tread depth", "lane_start_s": "lane begins", "lane_end_s": "lane ends",
+    "pressure_front_bar": "gauge pressure, front", "pressure_rear_bar": "gauge pressure, rear",
+    "water_depth_mm": "water depth", "water_depth_left_mm": "water depth, left track", "load_front_kg": "load, front",
+    "load_rear_kg": "load, rear", "tread_depth_mm": "tread depth", "lane_start_s": "lane begins",
+    "lane_end_s": "lane ends",
 }  # fmt: skip
 _UNITS = {"bar": "bar", "mm": "mm", "kg": "kg", "s": "s"}
 _NOT_GIVEN = "not given"
 
 
 def key_title(key: str) -> str:
-    """`pressure_rear_bar` -> `pressure, rear`; own columns without their x_."""
+    """`pressure_rear_bar` -> `gauge pressure, rear`; own columns without their x_."""
     return cut(_TITLES.get(key, key.removeprefix("x_").replace("_", " ")))
 
 
