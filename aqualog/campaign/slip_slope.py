@@ -13,11 +13,11 @@ from aqualog.campaign.bins import DEPTH_KEYS, NO_DRIVETRAIN, Cell, Group, Picked
 from aqualog.campaign.delay import Delay, Source, delays, late_slip, source_of
 from aqualog.campaign.expected import LINEAR, Expected, contact_of, expected_of_runs, friction_of, tangent_of
 from aqualog.campaign.results import SETTLING_S, CampaignData, RunInfo, RunSamples
-from aqualog.core.intervals import NOWHERE, Interval
+from aqualog.core.intervals import NOWHERE, Interval, student_quantile
 from aqualog.core.moments import Design
 from aqualog.core.notation import SIDES
 from aqualog.core.records import FloatArray
-from aqualog.core.regression import NOISE_MAX, Estimate, estimate
+from aqualog.core.regression import NOISE_MAX, ByRun, Estimate, estimate
 
 __all__ = [
     "LIMITS", "Limits", "SlopeRow", "SlopeTable", "at_zero_slip", "contact", "fit_slope", "slip_slopes", "too_few_runs",
@@ -60,6 +60,7 @@ class SlopeRow:
     to run, relative; `dof` of the interval. `reliable`: a slope with an interval that spans less than `SPAN_MAX`, from
     a line that explains more than a constant. `reason` why there is no slope, no interval, or no reliable one.
     `slope_dry` with interval and runs: same configuration and wheel off the lane, all speeds, over `mu_range_dry`.
+    `by_run`: parts of the runs in the error of 1 / slope, over its standard error: bins of the same runs err together.
     `contact_ratio` L [-]: see `contact`. `friction` (dry, wet) used for it. `expected`: the model's slope over the same
     traction. NaN without an estimate.
     """
@@ -91,6 +92,7 @@ class SlopeRow:
     contact_ratio: float = math.nan
     contact_ratio_ci: Interval = NOWHERE
     expected: Expected = field(default_factory=Expected)
+    by_run: ByRun = field(default=ByRun(), compare=False, repr=False)
 
     @property
     def told(self) -> bool:
@@ -269,7 +271,9 @@ def _told(
         return replace(row, reason=too_few_runs(found.runs, limits))
     if is_open and bare.road == "wet":
         return replace(row, reason="the delay of v_x is not known: dry driving at different accelerations shows it")
-    row = replace(row, slope_ci=(1.0 / high, 1.0 / low), intercept_ci=found.interval(1))
+    own = found.by_run[0]
+    own = own._replace(part=own.part * student_quantile(0.975, row.dof) / half)
+    row = replace(row, slope_ci=(1.0 / high, 1.0 / low), intercept_ci=found.interval(1), by_run=own)
     doubt = ""
     if high / low > SPAN_MAX:
         doubt = f"the interval spans a factor of {high / low:.1f}, at most {SPAN_MAX:g} is reliable"

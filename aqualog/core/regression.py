@@ -19,7 +19,7 @@ from aqualog.core.intervals import Interval, half_width
 from aqualog.core.moments import APART, Design, Index, Moments, Noise, block_moments, moments_of, residuals, starts_of
 from aqualog.core.records import FloatArray
 
-__all__ = ["NOISE_MAX", "Estimate", "estimate", "jackknife"]
+__all__ = ["NOISE_MAX", "ByRun", "Estimate", "degrees_of_freedom", "estimate", "jackknife"]
 
 NOISE_MAX = 0.30  # share of a coefficient; beyond, its correction rests on the noise more than on the data
 ROUNDS = 12
@@ -214,6 +214,16 @@ def _huber_weights(d: Design, first: Index, m: Moments, w: _Working, value: Floa
     return weight
 
 
+class ByRun(NamedTuple):
+    """What each run does to an estimate, arrays (g,): its `run`, its `part` in the error, whose squares add up to the
+    variance (CR2), and its `share` in the information. Estimates from the same runs err together by their parts.
+    """
+
+    run: Index = np.zeros(0, dtype=np.int64)
+    part: FloatArray = np.zeros(0)
+    share: FloatArray = np.zeros(0)
+
+
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """Coefficients of a fit.
@@ -221,7 +231,7 @@ class Estimate:
     `value`, `half` (p,): estimates and half widths of the 95 % intervals, infinite with one run; `dof` (p,) degrees of
     freedom; `scatter` (p,) standard deviation of the coefficients from run to run; `attenuation` share of the noisy
     column's coefficient that plain least squares would have lost [-]; `noise` variance of that column's noise; numbers
-    of `runs` and `samples`.
+    of `runs` and `samples`; `by_run` of each coefficient.
     """
 
     value: FloatArray
@@ -232,6 +242,7 @@ class Estimate:
     noise: float
     runs: int
     samples: int
+    by_run: tuple[ByRun, ...]
 
     def interval(self, i: int) -> Interval:
         """95 % interval of a coefficient."""
@@ -272,10 +283,12 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
         old, (value, k) = value, _solve(moments, working)
         if np.all(np.abs(value - old) <= 1e-4 * np.abs(value)):
             break
-    half, dof = _half_widths(moments, k, value)
+    half, dof, parts, shares = _half_widths(moments, k, value)
     if robust:
         # a clipped residual does not depend on the coefficients, though its weight is not zero ([huber1981], chapter 7)
-        half = half * float(weight.mean() / max(float(np.mean(weight == 1.0)), 0.5))
+        clipped = float(weight.mean() / max(float(np.mean(weight == 1.0)), 0.5))
+        half, parts = half * clipped, parts * clipped
+    by_run = tuple(ByRun(d.run[first], part / u, share) for part, share, u in zip(parts, shares, unit, strict=True))
     i = d.noisy.index(True) if any(d.noisy) else -1
     noise = 0.0
     if i >= 0:  # fast changes that y does not follow
@@ -283,7 +296,7 @@ def estimate(design: Design, *, robust: bool = False) -> Estimate:
         noise = max(float(plain.h_noise[:, i, i].sum()) - max(real, 0.0), 0.0) / float(plain.weight.sum())
     return Estimate(
         value / unit, half / unit, dof, np.sqrt(working.between) / unit, _attenuation(moments, k, noise, i),
-        noise * (float(unit[i]) ** 2 if i >= 0 else 0.0), first.size, d.y.size,
+        noise * (float(unit[i]) ** 2 if i >= 0 else 0.0), first.size, d.y.size, by_run,
     )  # fmt: skip
 
 
@@ -296,11 +309,12 @@ def _solve(m: Moments, w: _Working) -> tuple[FloatArray, FloatArray]:
     return value, np.asarray(k, dtype=np.float64)
 
 
-def _half_widths(m: Moments, k: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Half widths of the 95 % intervals and degrees of freedom, by the scores of the runs."""
+def _half_widths(m: Moments, k: FloatArray, value: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Half widths of the 95 % intervals and degrees of freedom, by the scores of the runs; those, and shares (p, g)."""
     p, g = value.size, k.shape[0]
+    parts, shares = np.zeros((p, g)), np.full((p, g), 1.0 / g)
     if g < 2:
-        return np.full(p, np.inf), np.zeros(p)
+        return np.full(p, np.inf), np.zeros(p), parts, shares
     plain = np.einsum("gij,gjk->gik", k, m.h)
     plain = 0.5 * (plain + np.swapaxes(plain, 1, 2))
     size, axes = np.linalg.eigh(plain.sum(axis=0))
@@ -318,15 +332,23 @@ def _half_widths(m: Moments, k: FloatArray, value: FloatArray) -> tuple[FloatArr
     b = (turn * share[:, None]) @ back
     for i in range(p):
         w = to_value[i]
-        sigma = math.sqrt(float(np.sum((score @ w) ** 2)))
+        parts[i] = score @ w
+        sigma = math.sqrt(float(np.sum(parts[i] ** 2)))
         q = grow @ w
         r = np.einsum("gij,gj->gi", b, q)
         omega = r @ r.T
         np.einsum("gg->g", omega)[:] -= np.einsum("gi,gi->g", q, r)
-        power = float(np.vdot(omega, omega))
-        dof[i] = max(float(np.trace(omega)) ** 2 / power, 1.0) if power > 0.0 else 1.0
+        dof[i] = degrees_of_freedom(omega)
         half[i] = half_width(sigma, float(dof[i]))
-    return half, dof
+        if (total := float(np.trace(omega))) < 0.0:
+            shares[i] = np.diag(omega) / total
+    return half, dof, parts, shares
+
+
+def degrees_of_freedom(omega: FloatArray) -> float:
+    """Satterthwaite's degrees of freedom of a sum of squares, from the covariance (g, g) of its terms."""
+    power = float(np.vdot(omega, omega))
+    return max(float(np.trace(omega)) ** 2 / power, 1.0) if power > 0.0 else 1.0
 
 
 def _attenuation(m: Moments, k: FloatArray, noise: float, i: int) -> float:

@@ -13,8 +13,8 @@ from typing import Any, Literal
 from aqualog.core.errors import ConfigError
 
 __all__ = [
-    "DIFFERENCE", "KINDS", "NEEDS_DATA", "VERDICTS", "Check", "Checks", "Conclusion", "Verdict", "claims", "combined",
-    "judge", "judged", "limit", "limits", "number_of",
+    "DIFFERENCE", "KINDS", "NEEDS_DATA", "NOT_REPRODUCED", "REPRODUCED", "VERDICTS", "Check", "Checks", "Conclusion",
+    "Verdict", "claims", "combined", "judge", "judged", "limit", "limits", "number_of",
 ]  # fmt: skip
 
 COUNT = 118

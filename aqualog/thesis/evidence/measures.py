@@ -14,22 +14,24 @@ from aqualog.campaign.means import dry_level
 from aqualog.campaign.results import RunInfo, RunSamples
 from aqualog.campaign.slip_slope import SlopeRow
 from aqualog.campaign.spin_downs import Pass, passes
-from aqualog.core.intervals import student_quantile
+from aqualog.core.intervals import half_width, student_quantile
 from aqualog.core.moments import Design
 from aqualog.core.records import BoolArray, FloatArray
-from aqualog.core.regression import estimate
+from aqualog.core.regression import degrees_of_freedom, estimate
+from aqualog.thesis.claims import NEEDS_DATA, NOT_REPRODUCED, REPRODUCED, Verdict
 from aqualog.thesis.evidence.campaign import KMH, Evidence
 
 __all__ = [
-    "TEN", "Effect", "Means", "additive", "begins", "bin_means", "common", "difference", "fall", "full_speed",
-    "half_speeds", "has_full", "has_minor", "line_of_logs", "lines_through", "over_passes", "passes_of", "pool_of",
-    "ratio", "resistance_of", "trend", "uneven", "usable",
+    "TEN", "TOO_FEW", "Effect", "Means", "additive", "begins", "bin_means", "common", "difference", "fall",
+    "full_speed", "half_speeds", "has_full", "has_minor", "line_of_logs", "lines_through", "over_passes", "passes_of",
+    "pool_of", "ratio", "resistance_of", "trend", "uneven", "usable",
 ]  # fmt: skip
 
 LEAST_RUNS = 3  # for an interval
 LEAST_BIN = 3  # samples of a bin that is drawn
 _APART = 10_000_000  # between the steps of two wheels of one run, which are no neighbours
 TEN = 10 * KMH  # [m/s] step of speed for gradients
+TOO_FEW = "Too few runs: the interval holds no effect as well as one that counts."
 
 Columns = Callable[[RunInfo, RunSamples], tuple[BoolArray, FloatArray] | None]
 """Samples of a run that count (n,), and the value at each (n,); None without any."""
@@ -59,9 +61,10 @@ class Effect:
         """Whether the whole interval is below 0."""
         return self.high < 0.0
 
-    def is_none(self, most: float) -> bool:
-        """No effect that matters: the interval holds 0, or does not leave ±most."""
-        return self.low <= 0.0 <= self.high or self.is_within(most)
+    def absent(self, most: float) -> Verdict:
+        """Verdict on "no effect": the interval stays within ±most. One that holds 0 and leaves them needs more runs."""
+        is_open = self.low <= 0.0 <= self.high
+        return REPRODUCED if self.is_within(most) else NEEDS_DATA if is_open else NOT_REPRODUCED
 
     def is_within(self, most: float) -> bool:
         """Whether the whole interval is within ±most."""
@@ -269,9 +272,10 @@ def line_of_logs(rows: Sequence[SlopeRow], columns: Sequence[FloatArray]) -> lis
     """Coefficients of columns (each (n,)) over the logarithms of the slopes; None with no more bins than columns.
 
     Weights come from each bin's own error and from the additional scatter about the line. The scatter is DerSimonian
-    and Laird's moment [dersimonian1986], repeated until it converges. The interval is Student's, with bins minus
-    columns as degrees of freedom. A run passes through two or three neighbouring bins, and both wheels of an axle share
-    it; the bins are assumed to be independent.
+    and Laird's moment [dersimonian1986] for errors that hang together, repeated until it converges. A run passes
+    through several bins, and both wheels of an axle share it: the errors of the bins are put together run by run (CR2
+    of `aqualog.core.regression`). The interval is Student's, with Satterthwaite's degrees of freedom of the runs, or
+    bins minus columns where these are fewer.
     """
     x = np.stack(columns, axis=1)
     n, p = x.shape
@@ -279,21 +283,45 @@ def line_of_logs(rows: Sequence[SlopeRow], columns: Sequence[FloatArray]) -> lis
         return None
     y, se = (np.array(v) for v in zip(*(_log(r) for r in rows), strict=True))
     se = np.maximum(se, 1e-4)
+    part, share = _runs_of(rows)
+    shared = (se[:, None] * part) @ (se[:, None] * part).T
+    shared[np.diag_indices(n)] = se**2  # with what a late v_x adds to each
     tau2 = 0.0
     for _ in range(_ROUNDS):
         w = 1.0 / (se**2 + tau2)
-        cov = np.linalg.inv((x.T * w) @ x)
-        b = cov @ ((x.T * w) @ y)
-        q = float(np.sum(w * (y - x @ b) ** 2))
-        more = (q - (n - p)) / float(np.sum(w))
+        to_value = np.linalg.inv((x.T * w) @ x) @ (x.T * w)
+        left = np.diag(w) - (x * w[:, None]) @ to_value  # takes the line off, and weighs
+        more = (float(y @ left @ y) - float(np.vdot(left, shared))) / float(np.trace(left)) - tau2
         new = max(tau2 + more, 0.0)
         if abs(new - tau2) <= 1e-6 * max(tau2, 1e-8):
             break
         tau2 = new
-    t = student_quantile(0.975, float(n - p))
+    variance = np.einsum("ik,kl,il->i", to_value, shared + tau2 * np.eye(n), to_value)
     runs = min(r.runs for r in rows)
-    half = t * np.sqrt(np.diag(cov) * max(q / (n - p), 1.0))
-    return [Effect(float(v), float(v - h), float(v + h), runs) for v, h in zip(b, half, strict=True)]
+    found = []
+    for a, v, square in zip(to_value, to_value @ y, variance, strict=True):
+        half = half_width(math.sqrt(max(float(square), 0.0)), min(_dof(a * se, share), float(n - p)))
+        found.append(Effect(float(v), float(v - half), float(v + half), runs))
+    return found
+
+
+def _runs_of(rows: Sequence[SlopeRow]) -> tuple[FloatArray, FloatArray]:
+    """Parts and shares of all runs in the bins, each (n, g)."""
+    at = {run: i for i, run in enumerate(sorted({int(i) for r in rows for i in r.by_run.run}))}
+    part, share = np.zeros((len(rows), len(at))), np.zeros((len(rows), len(at)))
+    for k, r in enumerate(rows):
+        where = [at[int(i)] for i in r.by_run.run]
+        part[k, where], share[k, where] = r.by_run.part, r.by_run.share
+    return part, share
+
+
+def _dof(weight: FloatArray, share: FloatArray) -> float:
+    """Degrees of freedom of a sum of bins (n,): what it takes of each, and the shares of the runs in them (n, g)."""
+    omega = np.zeros((share.shape[1],) * 2)
+    for a, s in zip(weight, np.minimum(share, 1.0 - 1e-6), strict=True):
+        root = s / np.sqrt(1.0 - s)
+        omega += a * a * (np.diag(s / (1.0 - s)) - np.outer(root, root))
+    return degrees_of_freedom(omega) if omega.size else math.inf
 
 
 def _tens(rows: Sequence[SlopeRow]) -> FloatArray:

@@ -12,7 +12,7 @@ from aqualog.campaign.bins import Pool
 from aqualog.campaign.results import RunInfo
 from aqualog.report.theme import INK, MUTED, THRESHOLD
 from aqualog.thesis.catalogue import figure_of, needs_of
-from aqualog.thesis.claims import Check, judge, limit
+from aqualog.thesis.claims import NEEDS_DATA, NOT_REPRODUCED, REPRODUCED, Check, Verdict, combined, judge, limit
 from aqualog.thesis.evidence import measures
 from aqualog.thesis.evidence.campaign import KMH, Evidence
 from aqualog.thesis.evidence.selection import Level, NotInCampaign, Selected, depth_mm, marks, pairs
@@ -201,7 +201,9 @@ def _c38(found: Resistance) -> Check | None:
     if rise is None or (len(shallow) > 1 and flat is None):
         return None
     is_risen = rise[0].is_above and rise[1].is_above
-    is_flat = flat is None or (flat[0].is_none(_LEVEL) and flat[1].is_none(_GRADIENT))
+    risen = REPRODUCED if is_risen else NOT_REPRODUCED if rise[0].ci else NEEDS_DATA
+    flats = [e.absent(most) for e, most in zip(flat or (), (_LEVEL, _GRADIENT), strict=False)]
+    flatness = NOT_REPRODUCED if NOT_REPRODUCED in flats else NEEDS_DATA if NEEDS_DATA in flats else REPRODUCED
     words = (
         f"{shallow[-1].name} to {deep[-1].name}: level {rise[0].words()} {UNIT}, gradient {rise[1].words()} {PER_TEN}"
     )
@@ -210,21 +212,23 @@ def _c38(found: Resistance) -> Check | None:
             f"{shallow[0].name} to {shallow[-1].name}: level {flat[0].words()} {UNIT}, gradient {flat[1].words()} "
             f"{PER_TEN}; {words}"
         )
-    part = is_flat or is_risen
-    whole = is_flat and is_risen
-    fields = {"why": _reason(flat, rise)}
-    return judge("C38.figure", words, whole=whole, part=part, value=rise[0].value, ci95=rise[0].ci, fields=fields)
+    verdict = combined((flatness, risen))
+    fields = {"why": _reason(flats, rise)}
+    return judge("C38.figure", words, verdict=verdict, value=rise[0].value, ci95=rise[0].ci, fields=fields)
 
 
-def _reason(flat: tuple[measures.Effect, measures.Effect] | None, rise: tuple[measures.Effect, measures.Effect]) -> str:
-    words = []
-    if flat is not None and not flat[0].is_none(_LEVEL):
-        words.append("the level rises already within the shallow waters")
-    if flat is not None and not flat[1].is_none(_GRADIENT):
-        words.append("the gradient changes already within the shallow waters")
+_SHALLOW_WORDS = {
+    NOT_REPRODUCED: "the {} changes already within the shallow waters",
+    NEEDS_DATA: "the runs are too few to say that the {} stays within the shallow waters",
+}
+
+
+def _reason(flats: Sequence[Verdict], rise: tuple[measures.Effect, measures.Effect]) -> str:
+    names = ("level", "gradient")
+    words = [_SHALLOW_WORDS[v].format(n) for n, v in zip(names, flats, strict=False) if v in _SHALLOW_WORDS]
     words += [
         f"the {n} in deep water does not differ significantly"
-        for n, e in zip(("level", "gradient"), rise, strict=True)
+        for n, e in zip(names, rise, strict=True)
         if not e.is_above
     ]
     return (", ".join(words) + ".").capitalize()
@@ -236,11 +240,10 @@ def _c43(found: Resistance) -> Check | None:
     if effect is None:
         return None
     level = effect[0]
-    whole = level.is_within(_HALF)
+    verdict = level.absent(_HALF)
     outcome = f"{high.name} less {low.name}: level {level.words()} {UNIT}"
-    return judge(
-        "C43.figure", outcome, whole=whole, part=level.low <= 0.0 <= level.high, value=level.value, ci95=level.ci
-    )
+    reason = measures.TOO_FEW if verdict == NEEDS_DATA else None
+    return judge("C43.figure", outcome, verdict=verdict, value=level.value, ci95=level.ci, reason=reason)
 
 
 def _c45(found: Resistance) -> Check | None:

@@ -14,10 +14,11 @@ from aqualog.campaign.results import RunInfo
 from aqualog.campaign.slip_slope import SlopeRow, SlopeTable, at_zero_slip, slip_slopes
 from aqualog.report.theme import MUTED, wheel_colour
 from aqualog.thesis.catalogue import figure_of, needs_of
-from aqualog.thesis.claims import Check, judge, limit
+from aqualog.thesis.claims import NEEDS_DATA, NOT_REPRODUCED, Check, combined, judge, limit
 from aqualog.thesis.evidence.campaign import Evidence
 from aqualog.thesis.evidence.measures import (
     TEN,
+    TOO_FEW,
     Effect,
     Means,
     fall,
@@ -253,11 +254,12 @@ def _c50(found: Slopes) -> Check | None:
     if not effects:
         return None
     ratios = {w: e[0] for w, e in effects.items()}
-    none = [w for w, e in ratios.items() if e.low <= 1.0 <= e.high or (e.low >= 1 - _SAME and e.high <= 1 + _SAME)]
+    verdicts = [e.mapped(lambda x: x - 1.0).absent(_SAME) for e in ratios.values()]
+    reason = TOO_FEW if NEEDS_DATA in verdicts and NOT_REPRODUCED not in verdicts else None
     worst = min(ratios.values(), key=lambda e: e.value)
     outcome = f"{levels[-1].name} over {levels[0].name}: " + "; ".join(f"{w} {e.words(2)}" for w, e in ratios.items())
-    whole, part = len(none) == len(ratios), bool(none)
-    return judge("C50.figure", outcome, whole=whole, part=part, value=worst.value, ci95=worst.ci)
+    verdict = combined(verdicts)
+    return judge("C50.figure", outcome, verdict=verdict, value=worst.value, ci95=worst.ci, reason=reason)
 
 
 def _c51(found: Slopes) -> Check | None:
@@ -349,7 +351,7 @@ def _c54(found: Slopes) -> Check | None:
                 rows.append((f"{words} {wheel}".strip(), old, deep))
     if not rows:
         return None
-    level = [r for r in rows if r[2].is_none(_NONE) or r[2].is_above]
+    level = [r for r in rows if r[2].low >= -_NONE]
     falling = [r for r in rows if r[1].is_below]
     less = [r for r in rows if r[2].value > r[1].value / 3.0]
     worst = min((r[2] for r in rows), key=lambda e: e.low)
@@ -357,7 +359,12 @@ def _c54(found: Slopes) -> Check | None:
     outcome = "; ".join(f"{n}: worn {a.words(1)}, less worn {b.words(1)} %" for n, a, b in rows)
     part = len(less) == len(rows)
     fields = {"still": len(level), "all": len(rows), "falling": len(falling)}
-    return judge("C54.figure", outcome, whole=whole, part=part, value=worst.value, ci95=worst.ci, fields=fields)
+    is_open = len(falling) == len(rows) and not any(r[2].is_below for r in rows if r not in level)
+    verdict, reason = (NEEDS_DATA, TOO_FEW) if is_open and not whole and not part else (None, None)
+    return judge(
+        "C54.figure", outcome, whole=whole, part=part, verdict=verdict, value=worst.value, ci95=worst.ci,
+        reason=reason, fields=fields,
+    )  # fmt: skip
 
 
 _SLIGHT_PERCENT = limit("slight", "C55.figure")  # [%] more is not "slight"

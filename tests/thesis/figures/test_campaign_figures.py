@@ -14,9 +14,11 @@ import pytest
 from aqualog.campaign.slip_slope import SlopeRow
 from aqualog.campaign.spin_downs import Pass
 from aqualog.core.errors import ConfigError
+from aqualog.core.intervals import half_width
+from aqualog.core.regression import ByRun
 from aqualog.thesis import image
 from aqualog.thesis.catalogue import OF_CAMPAIGN, Wish
-from aqualog.thesis.claims import DIFFERENCE, NOT_REPRODUCED, REPRODUCED
+from aqualog.thesis.claims import DIFFERENCE, NEEDS_DATA, NOT_REPRODUCED, REPRODUCED
 from aqualog.thesis.draw import panel_figure
 from aqualog.thesis.evidence import measures
 from aqualog.thesis.evidence.measures import Effect
@@ -186,13 +188,15 @@ def effect(value, half):
 
 @pytest.mark.parametrize(
     ("flat", "rise", "verdict"),
-    [(0.0, 0.3, REPRODUCED), (0.2, 0.3, DIFFERENCE), (0.0, 0.01, DIFFERENCE), (0.2, 0.01, NOT_REPRODUCED)],
-)
+    [(0.0, 0.3, REPRODUCED), (0.2, 0.3, DIFFERENCE), (0.0, 0.01, DIFFERENCE), (0.2, 0.01, NOT_REPRODUCED),
+     # an interval that holds 0 because it is wide is no evidence that nothing changes
+     ((0.1, 0.15), 0.3, DIFFERENCE), ((0.1, 0.15), 0.01, NOT_REPRODUCED)],
+)  # fmt: skip
 def test_c38_by_hand(flat, rise, verdict):
     levels = [level(f"{d} mm", (d, None)) for d in (0.6, 1.3, 2.0)]
     small = effect(0.0, 0.01)
     found = Found(levels, Wish(("depth",)), {
-        ("0.6 mm", "1.3 mm"): (effect(flat, 0.02), small),
+        ("0.6 mm", "1.3 mm"): (effect(*flat) if isinstance(flat, tuple) else effect(flat, 0.02), small),
         ("1.3 mm", "2.0 mm"): (effect(rise, 0.02), effect(0.1, 0.05)),
     })  # fmt: skip
     c38 = resistance._c38(found)
@@ -278,6 +282,69 @@ def test_fall_and_ratio_of_slopes_by_hand():
     assert measures.fall(a[:2]) is None
     assert measures.ratio(a[:1], b) is None
     assert measures.uneven(a) == pytest.approx(0.0, abs=1e-9)
+
+
+def of_runs(runs, errors, kmh=(65.0, 75.0, 85.0, 95.0)):
+    """Bins of both rear wheels: `errors` of the logarithm (wheels, bins, runs) in runs of equal length."""
+    n, out = len(runs), []
+    for wheel, of_wheel in zip(("rl", "rr"), errors, strict=True):
+        for v, x in zip(kmh, of_wheel, strict=True):
+            se = x.std(ddof=1) / np.sqrt(n)
+            by_run = ByRun(np.asarray(runs), (x - x.mean()) / n / np.sqrt(1 - 1 / n) / se, np.full(n, 1 / n))
+            half = half_width(se, n - 1.0)
+            mid, ends = np.exp(x.mean()), np.exp(x.mean() + np.array([-half, half]))
+            out.append(
+                SlopeRow(
+                    (),
+                    wheel,
+                    "wet",
+                    v - 5,
+                    v + 5,
+                    n,
+                    100,
+                    (0.0, 0.1),
+                    v * KMH,
+                    25 * mid,
+                    tuple(25 * ends),
+                    dof=n - 1.0,
+                    reliable=True,
+                    by_run=by_run,
+                )
+            )
+    return out  # fmt: skip
+
+
+def test_bins_of_the_same_runs_err_together():
+    rng = np.random.default_rng(3)
+    one, two = rng.normal(0.0, 0.05, (2, 5))
+    a, b = (of_runs(range(f, f + 5), np.tile(x, (2, 4, 1))) for f, x in ((0, one), (10, two)))
+    over, _ = measures.ratio(a, b)
+    # eight bins say no more than one: two means of five runs
+    sd = math.sqrt((one.var(ddof=1) + two.var(ddof=1)) / 5.0)
+    assert math.log(over.high / over.low) / 2.0 == pytest.approx(half_width(sd, 8.0), rel=0.01)
+    # what all bins of a run share is not in the ratio of two wheels of the same runs
+    same, _ = measures.ratio(a[:4], [replace(r, wheel="rl") for r in a[4:]])
+    assert (same.low, same.high) == pytest.approx((1.0, 1.0), abs=1e-3)
+    held, draws = 0, 200
+    for _ in range(draws):
+        a, b = (of_runs(range(f, f + 4), rng.normal(0.0, 0.05, 4) + rng.normal(0.0, 0.02, (2, 4, 4))) for f in (0, 10))
+        e = measures.ratio(a, b)[0]
+        held += e.low <= 1.0 <= e.high
+    assert held >= 0.89 * draws  # 0.945 of 600; 0.55 as if the bins were independent
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "verdict"),
+    [(0.93, 1.05, REPRODUCED), (0.72, 1.06, NEEDS_DATA), (0.80, 0.97, NOT_REPRODUCED), (0.91, 0.99, REPRODUCED)],
+)
+def test_c50_no_influence_is_shown_and_not_left_open(monkeypatch, low, high, verdict):
+    levels = (level("0.6 mm", (0.6, None)), level("2 mm", (2.0, None)))
+    found = SimpleNamespace(levels=levels, wheels=("rl",), of=lambda level, wheel=None: level)
+    monkeypatch.setattr(slip_slopes, "usable", lambda rows: rows)
+    monkeypatch.setattr(slip_slopes, "ratio", lambda a, b: (Effect(math.sqrt(low * high), low, high, 3), None))
+    c50 = slip_slopes._c50(found)
+    assert c50.verdict == verdict
+    assert (c50.reason == measures.TOO_FEW) is (verdict == NEEDS_DATA)
 
 
 def test_scatter_beyond_the_errors_widens_the_interval():
@@ -391,7 +458,9 @@ def test_slips_of_the_free_wheels_are_those_of_3_13():
 @pytest.mark.parametrize(
     ("worn", "deep", "verdict"),
     [(-6.0, (-0.3, -0.9, 0.2), REPRODUCED), (-6.0, (-1.3, -2.2, -0.4), DIFFERENCE), (1.0, (0.5, -0.9, 1.2), DIFFERENCE),
-     (-3.0, (-1.2, -1.9, -0.5), NOT_REPRODUCED)],
+     (-3.0, (-1.2, -1.9, -0.5), NOT_REPRODUCED),
+     # too wide to say that nothing falls
+     (-9.0, (-1.0, -9.0, 7.0), DIFFERENCE), (-9.0, (-5.0, -15.0, 5.0), NEEDS_DATA)],
 )  # fmt: skip
 def test_c54_new_winter_tyres_do_not_fall_and_worn_ones_do(monkeypatch, worn, deep, verdict):
     found = SimpleNamespace(levels=(), wheels=("rl",), selected=SimpleNamespace(wish=None), of=lambda level, _: level)
