@@ -159,8 +159,9 @@ def scaled(statistic: Statistic) -> Statistic:
 
 def _c39(table: Table) -> Check:
     found = {
-        name: estimate(scaled(gradient_of(table, p)), seeds_of(table, p)) for name, p in CONFIGURATIONS.items()
-    }  # fmt: skip
+        name: estimate(scaled(gradient_of(table, p)), seeds_of(table, p), of=len(CONFIGURATIONS))
+        for name, p in CONFIGURATIONS.items()
+    }
     rising = [x > 0.0 for x, _ in found.values()]
     value, ci = min(found.values())
     outcome = "1e-3 m/s^2 per km/h: " + ", ".join(f"{name} {told(*x)}" for name, x in found.items())
@@ -271,7 +272,7 @@ def _c45(table: Table) -> Check:
     change = {
         k: cells_of(table, at_speeds(p, LOAD_SPEEDS), "delta_a").mean(axis=0) - base for k, p in LOADED.items()
     }  # fmt: skip
-    found = {k: estimate(mean_of(x), base.size) for k, x in change.items()}
+    found = {k: estimate(mean_of(x), base.size, of=len(change)) for k, x in change.items()}
     below = [x < 0.0 for x, _ in found.values()]
     value, ci = max(found.values())
     outcome = f"{base.mean():.3f} m/s^2; " + ", ".join(f"{k} {told(*x, 3)}" for k, x in found.items()) + " more"

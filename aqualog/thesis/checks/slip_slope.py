@@ -145,7 +145,7 @@ def _c51(table: Table) -> Check:
     for name in FALLING:
         for w in ("rl", "rr"):
             x = slopes_of(table, _wiggling(name), SLOW, w)
-            found[f"{name} {w}"] = estimate(_gradient(x), x.shape[1])
+            found[f"{name} {w}"] = estimate(_gradient(x), x.shape[1], of=2 * len(FALLING))
     falling = [x < 0.0 for x, _ in found.values()]
     value, ci = max(found.values())
     outcome = "per km/h: " + ", ".join(f"{k} {told(*x, 2)}" for k, x in found.items())
@@ -228,7 +228,7 @@ def _c55(table: Table) -> Check:
     base = slopes_of(table, replace(UNLOADED, wiggles=True), FEW)
     cases = {k: slopes_of(table, replace(p, wiggles=True), FEW) for k, p in LOADED.items()}
     change = {k: np.nanmean(x, axis=0) - np.nanmean(base, axis=0) for k, x in cases.items()}
-    found = {k: estimate(mean_of(x), x.size) for k, x in change.items()}
+    found = {k: estimate(mean_of(x), x.size, of=len(change)) for k, x in change.items()}
     above = [x > 0.0 for x, _ in found.values()]
     share = max(x for x, _ in found.values()) / float(np.nanmean(base))
     is_slight = share <= SLIGHT

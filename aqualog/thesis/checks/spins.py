@@ -284,7 +284,7 @@ def _c22(table: Table) -> Check:
     n = spins.shape[1]
     ranks, text = [], []
     for k, w in enumerate(("rl", "rr")):
-        rank = estimate(lambda rows, k=k: rank_correlation(*_bins(spins, k, rows)), n)  # type: ignore[misc]
+        rank = estimate(lambda rows, k=k: rank_correlation(*_bins(spins, k, rows)), n, of=2)  # type: ignore[misc]
         bins = ", ".join(f"{a:.0f}: {b:.3f}" for a, b in zip(*_bins(spins, k, np.arange(n)), strict=True))
         ranks.append(rank)
         text.append(f"{w}: {bins}, rank {told(*rank, 2)}")
@@ -329,7 +329,7 @@ def _c6(table: Table) -> Check:
         for effect, unit in (("dips", "spin-downs"), ("rear_spin", "rear spin-ups"), ("delta_a", "m/s^2")):
             values = cells_of(table, passes, effect)
             counted = (values > SPUN).astype(np.float64) if effect == "rear_spin" else values
-            sizes = [estimate(mean_of(x), x.size) for x in counted]
+            sizes = [estimate(mean_of(x), x.size, of=len(counted)) for x in counted]
             least, most = min(sizes), max(sizes)
             found[name, unit] = least[1][1] < most[1][0], f"{least[0]:.2f} to {most[0]:.2f} {unit}"
     differ = {name: [text for (n, _), (is_apart, text) in found.items() if n == name and is_apart] for name in _FACTORS}

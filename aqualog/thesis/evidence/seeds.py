@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aqualog.core.errors import ConfigError
-from aqualog.core.intervals import wilson
+from aqualog.core.intervals import Z95, student_quantile, wilson
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.guard.worker import Crashed, work_on
 from aqualog.thesis.claims import Check, Checks
@@ -194,10 +194,11 @@ def first_speed(speeds: Sequence[float], met: BoolArray, least: float = 0.5) -> 
     return statistic
 
 
-def estimate(statistic: Statistic, n: int) -> tuple[float, tuple[float, float]]:
-    """A number from n seeds and its 95 % interval: percentiles of a bootstrap over the seeds.
+def estimate(statistic: Statistic, n: int, *, of: int = 1) -> tuple[float, tuple[float, float]]:
+    """A number from n seeds and its 95 % interval: percentiles of a bootstrap over the seeds, `widened`.
 
     Draws in which the number is not there (NaN) are left out; without any the interval is that of the number alone.
+    Where one of several numbers is chosen, `of` is how many: all their intervals hold together.
     """
     value = statistic(np.arange(n))
     rng = np.random.default_rng(20240301)
@@ -205,7 +206,20 @@ def estimate(statistic: Statistic, n: int) -> tuple[float, tuple[float, float]]:
     drawn = np.sort(drawn[~np.isnan(drawn)])
     if not drawn.size:
         return value, (value, value)
-    return value, (float(drawn[int(0.025 * drawn.size)]), float(drawn[math.ceil(0.975 * drawn.size) - 1]))
+    ends = float(drawn[int(0.025 * drawn.size)]), float(drawn[math.ceil(0.975 * drawn.size) - 1])
+    return value, widened(value, ends, n, of=of)
+
+
+def widened(value: float, ends: tuple[float, float], n: int, *, of: int = 1) -> tuple[float, float]:
+    """A bootstrap's 95 % interval for few units, by Student's t, as in `aqualog.diagnose.gain`.
+
+    Resamples of n vary less than samples do, by (n - 1) / n, and few of them do not show how much. `of` intervals hold
+    together by Bonferroni's inequality.
+    """
+    if n < 2 or not math.isfinite(value):
+        return ends
+    wider = math.sqrt(n / (n - 1.0)) * student_quantile(1.0 - 0.025 / of, n - 1.0) / Z95
+    return value + wider * (ends[0] - value), value + wider * (ends[1] - value)
 
 
 class Number(TypedDict):
@@ -240,7 +254,7 @@ _RESAMPLES, _SEED = 2000, 20240301
 def bootstrap(
     values: Sequence[float] | FloatArray, statistic: Callable[[FloatArray], float] | None = None
 ) -> tuple[float, float]:
-    """95 % percentile interval of a statistic over runs (default: the mean), by resampling the runs [efron1979].
+    """95 % interval of a statistic over runs (default: the mean), by resampling the runs [efron1979], `widened`.
 
     Parameters
     ----------
@@ -252,11 +266,11 @@ def bootstrap(
     x = np.asarray(values, dtype=np.float64)
     rows = np.random.default_rng(_SEED).integers(0, x.shape[0], (_RESAMPLES, x.shape[0]))
     if statistic is None:
-        found = x[rows].mean(axis=1)
+        value, found = float(x.mean()), x[rows].mean(axis=1)
     else:
-        found = np.array([statistic(x[r]) for r in rows[:500]])
+        value, found = statistic(x), np.array([statistic(x[r]) for r in rows[:500]])
     low, high = np.nanquantile(found, [0.025, 0.975])
-    return float(low), float(high)
+    return widened(value, (float(low), float(high)), x.shape[0])
 
 
 def share(k: int, n: int) -> str:
