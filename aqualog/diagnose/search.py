@@ -185,8 +185,8 @@ def _repeated(arena: Arena, posterior: Posterior, model: Model) -> tuple[Arena, 
 def _softened(arena: Arena, led: Evidence, found: Refit, chosen: Sequence[int]) -> Arena:
     """The arena with the signatures of all other effects on tyres as soft as a set has found them.
 
-    A force shows in the slip as its share of the slip stiffness. With the file's, a brake that drags on soft tyres would
-    look like two effects.
+    A force shows in the slip as its share of the slip stiffness. With the file's, a brake that drags on soft tyres
+    would look like two effects.
     """
     asked = arena.evidence.asked
     if not any(asked[i].effect.name in SOFT for i in chosen):
