@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from aqualog.core.judgement import EPISODE_KINDS, Episode, EpisodeKind
 from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import Event, FloatArray
+from aqualog.detect.joint_criteria import V_STOPPED
 from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
 from aqualog.detect.registry import all_of
 from aqualog.detect.resistance import LATEST, RESISTANCE
@@ -25,6 +26,8 @@ __all__ = ["BRAKING_GAP_S", "GAP_S", "Way", "episodes_of"]
 GAP_S = 1.0  # [s] detections nearer than this have one cause: a joint warning outlasts its criteria by that much
 BRAKING_GAP_S = 3.0  # [s] lock-ups nearer than this belong to one braking
 STEP_S = 0.1  # [s] of the way that is kept
+STOPPED = -0.5  # [-] slip of a wheel that nothing but water or a brake makes, if no engine drives it
+DEAD = -300.0  # [m/s²] at the rim: a tyre on its limit stops a wheel so, a sensor that fails faster
 
 _JOINT = tuple(d.name for d in all_of("joint"))
 _WARNINGS = tuple(d.name for d in all_of("warning"))  # they come before, and are no aquaplaning
@@ -79,7 +82,9 @@ class Way:
         return np.array([np.interp(t_s, t, x) for x in sums[:, beside]])
 
 
-def episodes_of(events: Sequence[Event], way: Stretch, *, warns: bool = False) -> tuple[Episode, ...]:
+def episodes_of(
+    events: Sequence[Event], way: Stretch, *, warns: bool = False, rolling: Collection[str] = ()
+) -> tuple[Episode, ...]:
     """Group the detections of one drive into episodes.
 
     Parameters
@@ -90,6 +95,8 @@ def episodes_of(events: Sequence[Event], way: Stretch, *, warns: bool = False) -
         As `Way.between`.
     warns : bool
         Whether the margin ran, whose warnings show how far the water goes.
+    rolling : collection of str
+        Wheels that no engine drives and whose brakes are known, where no joint detector ran: what stops one is water.
 
     Returns
     -------
@@ -111,8 +118,8 @@ def episodes_of(events: Sequence[Event], way: Stretch, *, warns: bool = False) -
     water = [_Water(group, warned) for group in _groups([x for x in free if x[1].detector in _FORCES], GAP_S)]
     others = _by_begin(x for x in free if x[1].detector not in _FORCES)
     alone = [x for x in others if not any(w.takes(x) for w in _last(water, x))]
-    made = [_episode(w.members, way, w.span) for w in _without_echoes(water)]
-    made += [_episode(group, way, _span(group)) for group in _groups(alone, GAP_S)]
+    made = [_episode(w.members, way, w.span, rolling) for w in _without_echoes(water)]
+    made += [_episode(group, way, _span(group), rolling) for group in _groups(alone, GAP_S)]
     for group in _groups([x for x in numbered if _is_braking(x[1])], BRAKING_GAP_S):
         start, end = _span(group)
         wet = (i for i, x in enumerate(made) if x.kind == "aquaplaning" and start < x.end_s and end > x.start_s)
@@ -207,28 +214,41 @@ def _last(water: Sequence[_Water], item: _Numbered) -> Sequence[_Water]:
     return [*water[max(begun - 1, 0) : begun], *water[begun : begun + 1]]
 
 
-def _kind(events: Iterable[Event]) -> EpisodeKind:
+def _kind(events: Sequence[Event], rolling: Collection[str]) -> EpisodeKind:
     """The kind of an episode that no brake has begun.
 
     Water that takes half of the slip slope costs at least 0.2 m/s² (thesis C3, C44, C57). So a slope that is lost
     without resistance is lost to another surface.
     """
     found = {e.detector for e in events}
-    if found & set(_JOINT):
+    if found & set(_JOINT) or any(_is_afloat(e, rolling) for e in events):
         return "aquaplaning"
     if SLIP_SLOPE_DROP.name in found and RESISTANCE.name not in found:
         return "other_surface"
     return "suspected" if len({_EFFECT.get(d, d) for d in found}) > 1 else "single_detector"
 
 
-def _episode(group: Sequence[_Numbered], way: Stretch, span: tuple[float, float]) -> Episode:
+def _is_afloat(event: Event, rolling: Collection[str]) -> bool:
+    """Whether a wheel that rolled freely has lost half of its speed, as only water takes it."""
+    x = event.evidence
+    if event.detector != SPIN_DOWN.name or event.wheel not in rolling or _is_braking(event):
+        return False
+    return bool(
+        x.get("slip_min", 0.0) <= STOPPED and x.get("v_x", 0.0) >= V_STOPPED and x.get("a_w_delta_min", 0.0) >= DEAD
+    )
+
+
+def _episode(
+    group: Sequence[_Numbered], way: Stretch, span: tuple[float, float], rolling: Collection[str] = ()
+) -> Episode:
     events = [e for _, e in sorted(group, key=lambda x: (x[1].start_s, x[0]))]
     joint = [e for e in events if e.detector in _JOINT]
     metres, seconds = way(*span)
     wheels = _wheels(events)
-    decided = [d for e in joint for d in e.evidence.get("decided_by", ())] or [e.detector for e in events]
+    decided = [d for e in joint for d in e.evidence.get("decided_by", ())]
+    decided = decided or [e.detector for e in events if _is_afloat(e, rolling)] or [e.detector for e in events]
     return Episode(
-        _kind(events), *span, wheels, _shared(wheels, AXLES), _shared(wheels, SIDES),
+        _kind(events, rolling), *span, wheels, _shared(wheels, AXLES), _shared(wheels, SIDES),
         "full" if any(e.severity == "full" for e in joint or events) else "partial",
         metres / seconds if seconds > 0.0 else math.nan, tuple(dict.fromkeys(decided)),
         max(_known(events, "delta_a_x_max"), default=math.nan), min(_known(events, "slip_min"), default=math.nan),

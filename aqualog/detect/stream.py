@@ -11,6 +11,7 @@ import numpy as np
 from aqualog.checks.drive import may_be_water
 from aqualog.checks.look import Checks
 from aqualog.core.errors import ConfigError
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import DriveResult, Event, FloatArray, Signals, SlopeSummary, Track, Unavailable
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.braking import BrakeWatch
@@ -129,6 +130,8 @@ class Through:
         self._stream = DriveStream(vehicle, dt_ns, present, settings=settings, memory=memory)
         self._checks = Checks(present, vehicle, self._stream.dt) if is_checked else None
         self._vehicle = vehicle
+        is_free = vehicle.knows_drivetrain and "brake_pressure" in present
+        self._rolling = tuple(w for w in WHEELS if is_free and w not in vehicle.driven)
         self._events: list[Event] = []
         self._way = Way(self._stream.dt)
         self._least = Least(self._stream.dt)
@@ -158,8 +161,7 @@ class Through:
         events = in_order((*self._events, *stream.finish()))
         judgement = judge(
             events, stream.unavailable, [d.name for d in stream.watches], judged_s=self._judged * stream.dt,
-            way=self._way.between,
-            is_possible=may_be_water(checks),
+            way=self._way.between, is_possible=may_be_water(checks), rolling=self._rolling,
         )  # fmt: skip
         return DriveResult(
             signals=signals,

@@ -81,7 +81,7 @@ class Unjudged:
 
 def judge(
     events: Sequence[Event], unavailable: Sequence[Unavailable], ran: Collection[str], *, judged_s: float, way: Stretch,
-    is_possible: bool = True,
+    is_possible: bool = True, rolling: Collection[str] = (),
 ) -> Judgement:  # fmt: skip
     """Return the verdict and the episodes of one drive.
 
@@ -97,10 +97,14 @@ def judge(
         As `Way.between`.
     is_possible : bool
         Whether the resistance measure is one that water can make.
+    rolling : collection of str
+        Wheels that no engine drives and whose brakes are known.
 
-    A single detector never decides: without a joint one the verdict is `cannot_be_judged`, whatever the others found.
+    A single detector does not decide: without a joint one the verdict is `cannot_be_judged`, whatever the others found.
+    But a free wheel that loses half of its speed needs no second sign.
     """
-    found = episodes_of(events, way, warns=MARGIN.name in ran)
+    alone = rolling if not any(d in ran for d in JOINT) else ()
+    found = episodes_of(events, way, warns=MARGIN.name in ran, rolling=alone)
     if not is_possible:
         return Judgement("cannot_be_judged", (UNFIT,), tuple(ran), found, judged_s)
     wet = any(e.kind == "aquaplaning" for e in found)

@@ -159,6 +159,27 @@ def test_only_joint_detectors_that_saw_something_decide(events, ran, judged_s, e
     assert verdict(events, ran=ran, judged_s=judged_s).verdict == expected
 
 
+@pytest.mark.parametrize(
+    ("changed", "expected"),
+    [
+        ({}, "aquaplaning"), ({"slip_min": -0.4}, "cannot_be_judged"), ({"v_x": 12.0}, "cannot_be_judged"),
+        ({"a_w_delta_min": -900.0}, "cannot_be_judged"), ({"braking_at_start": True}, "cannot_be_judged"),
+    ],
+)  # fmt: skip
+def test_a_free_wheel_that_stops_needs_no_torque(changed, expected):
+    seen = {"slip_min": -0.9, "v_x": 28.0, "a_w_delta_min": -90.0, "braking_at_start": False, **changed}
+    events = [event("spin_down", 5.0, 7.0, "fl", "full", **seen), event("spin_down", 5.2, 6.0, "rl", slip_min=-0.1)]
+    for free, ran, verdict in (
+        (("fl", "fr"), ("spin_down",), expected), (("rl", "rr"), ("spin_down",), "cannot_be_judged"),
+        (("fl", "fr"), ("spin_down", "joint_criteria"), "none"),
+    ):  # fmt: skip
+        judged = judge(events, [], ran, judged_s=20.0, way=way, rolling=free)
+        assert judged.verdict == verdict
+        if verdict == "aquaplaning":
+            assert judged.episodes[0].decided_by == ("spin_down",)
+            assert judged.episodes[0].severity == "full"
+
+
 def test_what_is_missing_is_that_of_the_joint_detectors():
     lacks = [
         Unavailable("tie_rod", ("tie_rod_fl",)), Unavailable("joint_criteria", ("torque_rl", "vehicle.mass")),

@@ -122,6 +122,8 @@ def judged_by(judgement: Judgement, duration_s: float) -> tuple[str, str]:
     ran = ", ".join(detector_name(d) for d in judgement.ran) or "no detector"
     if judgement.verdict == "cannot_be_judged":
         return "Ran:", f"{ran}; no single detector decides by itself{_resistance(judgement)}"
+    if not judgement.judged_s:  # a wheel that no engine drives has stopped without a brake
+        return "Ran:", f"{ran}; a free wheel was lost without a brake, and what is less cannot be judged"
     return "Judged:", f"{number(min(judgement.judged_s, duration_s), 1)} of {number(duration_s, 1)} s, by {ran}"
 
 
