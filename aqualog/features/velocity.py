@@ -32,12 +32,13 @@ class VelocityParams(NamedTuple):
     tau_radius: float  # [s] time constant of the radius correction
     b_max: float  # [m/s^2] bound of the offset: mounting, drift and grade stay below
     fade: float  # [s] how long the last acceleration lasts in a gap of the accelerometer
+    trust: float  # [s] in which a reference that the accelerometer follows is believed against all wheels
     tau_side: float  # [s] in which a drift to the side is forgotten: longer, and the bank of a road adds up
 
 
 class VelocityState(NamedTuple):
-    """State of the observer: v [m/s], b [m/s²], acceleration [m/s²], time without a trusted measurement [s], drift to
-    the left [m/s]."""
+    """State of the observer: v [m/s], b [m/s²], acceleration [m/s²], time without a measurement that is trusted or
+    that the wheels do not contradict [s], drift to the left [m/s]."""
 
     v: float
     b: float
@@ -61,7 +62,7 @@ def params_from_seconds(dt: float, *, has_accelerometer: bool) -> VelocityParams
     """
     tau_v, tau_b = (0.25, 5.0) if has_accelerometer else (0.15, 0.3)
     k_v = gain(tau_v, dt)
-    return VelocityParams(dt, k_v, k_v / tau_b, has_accelerometer, 0.7, 0.02, 30.0, 3.0, 0.5, 2.0)
+    return VelocityParams(dt, k_v, k_v / tau_b, has_accelerometer, 0.7, 0.02, 30.0, 3.0, 0.5, 10.0, 2.0)
 
 
 @part
@@ -100,8 +101,10 @@ def _step(p, motion, kappa, age, v_ref, w, weights, a_x, a_y, yaw_rate):  # type
             known += weights[i]
             if abs(w[i] - middle) <= close:
                 agreeing += 1
-    # a reference cannot spin, but it can fail: three wheels that agree outvote one that is far off
-    use_reference = not math.isnan(v_ref) and not (agreeing >= 3 and abs(v_ref - middle) > 4.0 * gate)
+    # a reference cannot spin, but it can fail: three wheels that agree outvote one that is far off, but not at once one
+    # where the accelerometer expects it: on water all wheels can be lost
+    is_outvoted = agreeing >= 3 and abs(v_ref - middle) > 4.0 * gate
+    use_reference = not math.isnan(v_ref) and (not is_outvoted or (abs(v_ref - v) <= gate and lost < p.trust))
     total = 0.0
     error = 0.0
     far = 0.0
@@ -120,7 +123,7 @@ def _step(p, motion, kappa, age, v_ref, w, weights, a_x, a_y, yaw_rate):  # type
                 error += weights[i] * min(max(e, -gate), gate)
     if total > 0.0:
         error /= total
-        lost = 0.0
+        lost = lost + p.dt if is_outvoted else 0.0
         v += p.k_v * error
         b -= p.k_b * error
         if p.has_accelerometer:
@@ -214,8 +217,9 @@ def observe(
     dv/dt = a_x - b + yaw_rate v_y + (v_m - v) / tau_v, db/dt = -(v_m - v) / (tau_v tau_b), and of a car that slides or
     spins round dv_y/dt = a_y - yaw_rate v - v_y / tau_side. v_m is the reference velocity. Without one
     it is the weighted mean of the wheels that agree: three or more with each other, else those that agree with the
-    prediction. A wheel that spins or locks leaves the gate and no longer counts. A reference that three agreeing wheels
-    contradict does not count either. Where no wheel agrees for 2 s the observer restarts.
+    prediction. A wheel that spins or locks leaves the gate and no longer counts. A reference that three agreeing
+    wheels contradict does not count either; one that the accelerometer follows counts for 10 s yet. Where no wheel
+    agrees for 2 s the observer restarts.
 
     A slow correction per wheel (time constant 30 s, within 3 %, updated only while rolling steadily) removes radius
     errors: a reference that differs by 1 % in scale must not look like slip.

@@ -157,3 +157,24 @@ def test_shaken_wheels_are_no_resistance(inertia):
         for c in ({n: s.array(n) for n in s.symbols}, columns)
     ]
     assert means[1] == pytest.approx(means[0], abs=0.004)
+
+
+def seen(v_ref, v_w, a_x):
+    """Velocity that the observer finds of a reference, four like wheels and an accelerometer. [m/s]"""
+    n, none = v_ref.size, np.full(v_ref.size, np.nan)
+    p = params_from_seconds(DT, has_accelerometer=True)
+    return observe(
+        p, initial_motion(), v_ref, np.tile(v_w, (4, 1)), a_x, none, np.zeros(n), weights=np.ones(4)
+    )[0]  # fmt: skip
+
+
+def test_a_reference_that_the_accelerometer_follows_is_believed_where_all_wheels_float():
+    t = np.arange(3000) * DT
+    v, floats = 30.0 - 0.3 * t, (t > 10.0) & (t < 18.0)
+    a_x = np.full(t.size, -0.3)
+    wheels = np.where(floats, 0.2, v)
+    assert np.abs(seen(v, wheels, a_x) - v).max() < 0.1
+    # what the accelerometer does not follow has failed, and so has what is alone for longer
+    assert np.abs(seen(np.where(t > 10.0, 0.0, v), v, a_x) - v)[t > 12.0].max() < 0.5
+    drifts = v + np.where(t > 2.0, 2.0 * (t - 2.0), 0.0)
+    assert np.abs(seen(drifts, v, a_x) - v)[t > 25.0].max() < 0.5
