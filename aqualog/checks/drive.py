@@ -9,6 +9,7 @@ import numpy as np
 
 from aqualog.checks.doubts import Change, Doubt
 from aqualog.checks.driven import LEAST_DRIVE, STILL, drives, shown
+from aqualog.checks.relations import changes
 from aqualog.checks.slip import AXLE, slip_doubts
 from aqualog.checks.windows import EXTRA, PRESSURES, Windows
 from aqualog.core.intervals import half_width
@@ -110,7 +111,9 @@ def _gain(windows: Windows) -> Iterator[Doubt]:
     if "yaw_rate" in windows:
         with np.errstate(invalid="ignore"):
             good &= np.abs(v * windows["yaw_rate"]) < 1.5
-    found = _slope(pushed, v**2, a_x, good)
+    # over seconds: what holds the car back for longer, as water does where the driver pushes against it, is no gain
+    x, drag, y = (changes(np.where(good, z, np.nan), windows.step_s) for z in (pushed, v**2, a_x))
+    found = _slope(x, drag, y, good & np.isfinite(x + drag + y))
     if found is None:
         return
     gain, half = found
@@ -146,7 +149,7 @@ def _slope(x: FloatArray, drag: FloatArray, y: FloatArray, good: BoolArray) -> t
     labels, block = np.unique(block, return_inverse=True)
     if labels.size < LEAST_BLOCKS or float(x[good].std()) < SPREAD:
         return None
-    table = np.column_stack([x[good], drag[good] / float(drag[good].max()), np.ones(block.size), y[good]])
+    table = np.column_stack([x[good], drag[good] / float(np.abs(drag[good]).max()), np.ones(block.size), y[good]])
     products = table[:, :, None] * table[:, None, :]
     sums = np.zeros((labels.size, 4, 4))
     np.add.at(sums, block, products)

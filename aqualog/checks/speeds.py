@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -123,10 +122,13 @@ def _ratio(x: FloatArray, y: FloatArray) -> float:
 def _acceleration(windows: Windows, *, are_speeds_right: bool) -> Iterator[Doubt]:
     if "a_x" not in windows or not windows.wheels or windows["a_x"].size < 3:
         return
-    r, ratio, number = max((_beside(windows, k) for k in LENGTHS), key=lambda found: found[0])
-    limit = next((most for least, count, most in RATIOS if r > least and number >= count), math.inf)
+    found = [(*seen, most) for k in LENGTHS for least, count, most in RATIOS
+             if (seen := _beside(windows, k))[0] > least and seen[2] >= count]  # fmt: skip
+    if not found:
+        return
+    r, ratio, _, limit = max(found, key=lambda f: (f[0], -f[3]))
     # the scale lies between both regressions: noise, or grades in a_x, make one of the signals the larger one
-    if r * ratio > limit or ratio / max(r, LEAST_CORRELATION) < 1.0 / limit:
+    if r * ratio > limit or ratio / r < 1.0 / limit:
         what = f"wheel speeds change {ratio:.2g} times as fast as a_x says"
         g = next((x for x in (G, 1.0 / G) if 1.0 / _ROUGH < ratio / x < _ROUGH), None)
         ways = ({"a_x": Change(g, radius=1.0)},) if g and are_speeds_right else ()

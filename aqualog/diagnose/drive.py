@@ -23,8 +23,9 @@ from aqualog.model.follow import FOLLOW_RATE, Course, follow
 from aqualog.model.scenario import Lane
 from aqualog.model.term import Model, Term
 
-__all__ = ["RESERVED", "Drive", "floating", "led_by", "prepare", "rolling_under", "stretches"]
+__all__ = ["ON_WATER", "RESERVED", "Drive", "floating", "led_by", "prepare", "rolling_under", "stretches"]
 
+ON_WATER = " s on water "  # in the note on time that is not judged
 LITTLE = 0.5  # share of the time on water that is judged, below which a note says so
 BESIDE_S = 1.0  # [s] before and after what is left out
 BEHIND_S = 1.0  # [s] after a stretch of water, in which the rear axle and the speed still have it
@@ -175,7 +176,7 @@ def _judged_on_water(mask: BoolArray, course: Course, dt: float) -> list[str]:
     water_s, judged_s = (float(x.sum()) * block_step(dt) for x in (on_water, on_water & mask))
     if judged_s >= LITTLE * water_s:
         return []
-    return [f"of {water_s:.0f} s on water {judged_s:.0f} s are judged: in the rest a wheel may float"]
+    return [f"of {water_s:.0f}{ON_WATER}{judged_s:.0f} s are judged: in the rest a wheel may float"]
 
 
 def led_by(drive: Drive, model: Model) -> Drive:

@@ -18,7 +18,7 @@ from aqualog.diagnose.arena import by_drives, competing
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
-from aqualog.diagnose.drive import Drive, led_by, prepare
+from aqualog.diagnose.drive import ON_WATER, Drive, led_by, prepare
 from aqualog.diagnose.evidence import SURROGATES, Evidence, around_water, recentred, tolerant
 from aqualog.diagnose.faster import Late, faster, found_late, joined, with_rings
 from aqualog.diagnose.file_values import not_calibrated, with_known
@@ -150,6 +150,7 @@ def _diagnosed(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
         seen=p if p <= options.level else None, untested=untested | seen.untested,
         moved=bare.terms[len(with_known(given, vehicle).terms) :],
+        unjudged=[n for d in ready for n in d.notes if ON_WATER in n],
     )  # fmt: skip
     return Diagnosis(
         verdict=outcome.verdict,

@@ -87,17 +87,18 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 def verdict_sentence(
     verdict: str, causes: Sequence[Cause], *, level: float, reason: str = "", certain: frozenset[str] = frozenset(),
     seen: float | None = None, source: str = "log", untested: Mapping[str, str] | None = None,
-    moved: Sequence[Term] = (),
+    moved: Sequence[Term] = (), unjudged: Sequence[str] = (),
 ) -> str:  # fmt: skip
     """The verdict in one sentence, of a log that can be tested. `certain`: effects that are certain where others cannot
     be distinguished; `seen`: the test's p-value where it found more than noise; `source`: `log` or `campaign`;
     `untested`: effects that the log cannot show, and why; `moved`: values of the vehicle file that the model has
-    otherwise."""
+    otherwise; `unjudged`: water on which most of the drives was not judged."""
     names = [name_of(c.effect, c.where) + (f" in {listed(c.drives)}" if c.drives else "") for c in causes]
     if verdict == "no_effect" and seen is not None:
         return f"No effect is named: more than noise is left (p = {seen:.2g}), but no known effect explains it clearly."
     if verdict == "no_effect":
-        agrees = f"No effect: the model agrees with the measurement, at a false-alarm level of {level:g}"
+        where = "No effect where the drive is judged" if unjudged else "No effect"
+        agrees = f"{where}: the model agrees with the measurement, at a false-alarm level of {level:g}"
         why = Counter((untested or {}).values()).most_common(1)
         few = ""
         if why and why[0][1] >= MANY_UNTESTED:
@@ -105,6 +106,7 @@ def verdict_sentence(
             few = f"; {len(untested or {})} effects were not tested ({most}{why[0][0]})"
         if moved:
             few += f". For that it takes {listed([*map(term_words, moved)])}, as the vehicle file allows"
+        few += f". But {unjudged[0]}" if unjudged else ""
         return f"{agrees}{few}."
     if verdict == "named":
         return causes[0].sentence
@@ -124,6 +126,9 @@ def verdict_sentence(
         if len(causes) == 1 and not sure:
             odds = _odds(causes[0].probability)
             return f"The car may differ from the model, but this {source} does not make it certain: {names[0]}{odds}."
+        if len(causes) == 1:
+            odds = _odds(causes[0].probability)
+            return f"One effect is likely, but it is not named: {names[0]}{odds}. The notes say why."
         return f"The car differs from the model, but this {source} cannot distinguish {listed(names)}."
     likely = [_odds(c.probability) if c.probability < SURE else "" for c in causes]
     known = f" beside {listed([n + o for n, o in zip(names, likely, strict=True)])}" if names else ""

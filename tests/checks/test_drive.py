@@ -33,6 +33,14 @@ def test_a_gain_that_is_off(gain):
     assert f"mass = {CAR.mass / remark.value:.0f}" in remark.advice
 
 
+def test_water_that_the_driver_pushes_against_is_no_gain():
+    """Torque for 1.5 m/s² that moves nothing, 20 s of each minute."""
+    t = 0.05 * np.arange(DRIVE["v_x"].size)
+    against = np.where(t % 60.0 < 20.0, 1.5 * CAR.mass * CAR.arm("rl") / 2.0, 0.0)
+    wet = {**DRIVE, **{n: DRIVE[n] + against for n in TORQUES}}
+    assert [r for r in look(signals(wet), CAR) if r.kind == "torque"] == []
+
+
 def test_a_gain_of_the_file_is_multiplied():
     (remark,) = said(replace(CAR, torque_gain=0.5), **dict.fromkeys(TORQUES, 1.25))
     assert f"torque_gain = {0.5 * remark.value:.3g}" in remark.advice

@@ -244,6 +244,11 @@ def test_what_is_certain_is_not_called_open():
     one = verdict_sentence("cannot_tell", [replace(causes[0], probability=0.9)], level=0.01)
     why = "this log does not make it certain: payload mass (probability 0.90)"
     assert one == f"The car may differ from the model, but {why}."
+    one = verdict_sentence("cannot_tell", causes[:1], level=0.01, certain=frozenset({"payload_mass"}))
+    assert one == "One effect is likely, but it is not named: payload mass. The notes say why."
+    none = verdict_sentence("no_effect", (), level=0.01, unjudged=["of 58 s on water 0 s are judged: in the rest ..."])
+    assert none.startswith("No effect where the drive is judged: ")
+    assert none.endswith(". But of 58 s on water 0 s are judged: in the rest ....")
 
 
 def test_a_slope_of_the_tyre_is_known_as_well_as_the_form_of_its_curve():
