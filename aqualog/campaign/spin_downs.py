@@ -11,7 +11,7 @@ import numpy as np
 
 from aqualog.campaign.bins import KMH, Group, Plan, free_of, group_of, sort_key
 from aqualog.campaign.results import SETTLING_S, CampaignData, RunInfo
-from aqualog.core.intervals import Interval, poisson, wilson
+from aqualog.core.intervals import Interval, poisson, wilson, worth
 from aqualog.core.records import FloatArray
 
 __all__ = ["Pass", "SpinDownRow", "minor_spin_downs", "passes"]
@@ -72,8 +72,9 @@ class Pass:
 @dataclass(frozen=True, slots=True)
 class SpinDownRow:
     """A bin of speed: `passes` that were in it for half a second, or had an event there, `events` of minor spin-downs
-    begun in it, `per_s` and `per_100_m` with `per_s_ci` (counts, Poisson; exact [garwood1936]), `share` of the passes
-    with at least one (Wilson [wilson1927]), passes with a `full` spin-down in it, in which minor ones have no place,
+    begun in it, `per_s` and `per_100_m` with `per_s_ci` (exact Poisson [garwood1936], of as many events as those of the
+    passes are `worth`; with one pass as if each came alone), `share` of the passes with at least one (Wilson
+    [wilson1927]), passes with a `full` spin-down in it, in which minor ones have no place,
     `deepest` slip: median of the passes' deepest in it [-].
     """
 
@@ -162,12 +163,13 @@ def _row(key: tuple[Group, str, int], found: Sequence[_Part], width: float) -> S
     group, wheel, number = key
     events = sum(p.minor for p in found)
     seconds, metres = sum(p.seconds for p in found), sum(p.metres for p in found)
-    low, high = poisson(events)
+    each = worth([p.minor for p in found], [p.seconds for p in found], of_shares=False)
+    low, high = poisson(each * events)
     hit = sum(p.minor > 0 for p in found)
     depths = [p.deepest for p in found if math.isfinite(p.deepest)]
     return SpinDownRow(
         group, wheel, number * width, (number + 1) * width, len(found), seconds, events, _over(events, seconds),
-        (_over(low, seconds), _over(high, seconds)), 100.0 * _over(events, metres), hit / len(found),
+        (_over(low / each, seconds), _over(high / each, seconds)), 100.0 * _over(events, metres), hit / len(found),
         wilson(hit, len(found)), sum(p.is_full for p in found), float(np.median(depths)) if depths else math.nan,
     )  # fmt: skip
 

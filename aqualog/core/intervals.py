@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 from statistics import NormalDist
 
@@ -13,7 +13,7 @@ from aqualog.core.records import FloatArray
 
 __all__ = [
     "NOWHERE", "Z95", "Interval", "chi2_log_p", "half_width", "jackknife_sd", "poisson", "same_decimals",
-    "student_quantile", "variance_ratio_chance", "widened", "wilson",
+    "student_quantile", "variance_ratio_chance", "widened", "wilson", "worth",
 ]  # fmt: skip
 
 Interval = tuple[float, float]
@@ -75,13 +75,13 @@ def chi2_log_p(x: float, dof: int) -> float:
     return -log_tail / math.log(10.0)
 
 
-def wilson(k: int, n: int, level: float = 0.95) -> tuple[float, float]:
+def wilson(k: float, n: float, level: float = 0.95) -> tuple[float, float]:
     """Return the interval of a share: k of n. Wilson 1927 [wilson1927]; (0, 1) for n = 0, never NaN.
 
     Parameters
     ----------
-    k, n : int
-        0 <= k <= n.
+    k, n : float
+        0 <= k <= n; not whole as in `poisson`.
     level : float
         Confidence, 0 < level < 1.
     """
@@ -95,46 +95,71 @@ def wilson(k: int, n: int, level: float = 0.95) -> tuple[float, float]:
     return (0.0 if k == 0 else middle - half), (1.0 if k == n else middle + half)
 
 
-def poisson(k: int, level: float = 0.95) -> tuple[float, float]:
+def poisson(k: float, level: float = 0.95) -> tuple[float, float]:
     """Return the exact interval of the expected number of events where k were counted (Garwood 1936 [garwood1936]).
 
     Parameters
     ----------
-    k : int
-        Count, k >= 0.
+    k : float
+        Count, k >= 0; not whole where it is that of as many single events as clumped ones are worth.
     level : float
         Confidence, 0 < level < 1; half of the rest on either side, also for k = 0.
     """
     tail = 0.5 * (1.0 - level)
-    low = 0.0 if k == 0 else _mean_where(lambda m: 1.0 - _cdf(k - 1, m) - tail, k)
-    return low, _mean_where(lambda m: tail - _cdf(k, m), k)
+    low = 0.0 if k == 0 else _mean_where(lambda m: _reached(k, m) - tail, k)
+    return low, _mean_where(lambda m: _reached(k + 1.0, m) - 1.0 + tail, k)
 
 
-def _cdf(k: int, mean: float) -> float:
-    """Probability of at most k events; terms from the largest one down, so that nothing underflows."""
-    if mean <= 0.0:
+def worth(counts: Sequence[float], sizes: Sequence[float], *, of_shares: bool) -> float:
+    """How many single events each event is worth, where those of one run or drive come together; 1 at most.
+
+    Parameters
+    ----------
+    counts, sizes : sequences of float (g,)
+        Of each run: events, and cases or time in which they might be.
+    of_shares : bool
+        Whether sizes are cases, each with one event at most.
+
+    The variance of the ratio of the sums from run to run (CR2, as `aqualog.core.regression` has it for one column),
+    over that of single events, is the design effect. Intervals of single events with counts so much smaller, and with
+    Student's t in place of the normal quantile, are those of Korn and Graubard [korn1998]. The degrees of freedom are
+    those of the part between the runs [satterthwaite1946]: that of single events is known. Effects below 1 are chance.
+    With one run, without an event, or with one in each case, it does not show whether they come together: 1.
+    """
+    y, x = (np.asarray(v, dtype=np.float64) for v in (counts, sizes))
+    y, x = y[x > 0.0], x[x > 0.0]
+    total, size = float(y.sum()), float(x.sum())
+    # of n cases p (1 - p) shows (n - 1) / n
+    single = total * (size - total) / max(size - 1.0, 1.0) if of_shares else total
+    if y.size < 2 or single <= 1e-9 * total:
         return 1.0
-    first = min(k, int(mean))
-    log_first = first * math.log(mean) - mean - math.lgamma(first + 1.0)
-    total = term = 1.0
-    for i in range(first, 0, -1):
-        term *= i / mean
-        total += term
-        if term < 1e-17 * total:
-            break
-    term = 1.0
-    for i in range(first + 1, k + 1):
-        term *= mean / i
-        total += term
-        if term < 1e-17 * total:
-            break
-    return min(1.0, total * math.exp(log_first))
+    share = np.minimum(x / size, 1.0 - 1e-6)
+    odds = share / (1.0 - share)
+    effect = float(np.sum((y - total * share) ** 2 / (1.0 - share))) / single
+    if effect <= 1.0 + 1e-9:
+        return 1.0
+    power = float(odds @ odds - 2.0 * (odds @ (share * odds)) + (share @ odds) ** 2)
+    dof = max(1.0 / power, 1.0) * (effect / (effect - 1.0)) ** 2
+    return (Z95 / student_quantile(0.975, min(dof, 1e3))) ** 2 / effect
 
 
-def _mean_where(rising: Callable[[float], float], k: int) -> float:
+def _reached(k: float, mean: float) -> float:
+    """Chance of at least k events: the incomplete gamma function by its series, whose terms are all positive."""
+    if k <= 0.0 or mean <= 0.0:
+        return 1.0 if k <= 0.0 else 0.0
+    term = total = 1.0
+    n = k
+    while term > 1e-17 * total:
+        n += 1.0
+        term *= mean / n
+        total += term
+    return min(1.0, total * math.exp(k * math.log(mean) - mean - math.lgamma(k + 1.0)))
+
+
+def _mean_where(rising: Callable[[float], float], k: float) -> float:
     """Zero of a function that rises with the mean."""
     low, high = 0.0, k + 10.0 * math.sqrt(k + 1.0) + 20.0
-    for _ in range(200):
+    for _ in range(64):
         middle = 0.5 * (low + high)
         if rising(middle) > 0.0:
             high = middle

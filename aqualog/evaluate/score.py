@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from aqualog.core.intervals import poisson, wilson
+from aqualog.core.intervals import poisson, wilson, worth
 from aqualog.detect.registry import BY_NAME, RIVALS, all_of
 from aqualog.evaluate.records import Cell, Hit, RunRecord
 
@@ -24,12 +24,16 @@ KM_100 = 1e5  # [m]
 
 @dataclass(frozen=True, slots=True)
 class Recall:
-    """Episodes, those found within the limit, those with an earlier warning; latencies of all that were found. [s]"""
+    """Episodes, those found within the limit, those with an earlier warning; latencies of all that were found. [s]
+
+    `by_drive`: found and episodes of each drive. What one drive shows hangs together.
+    """
 
     episodes: int
     found: int
     before: int
     latencies: tuple[float, ...]
+    by_drive: tuple[tuple[int, int], ...] = field(default=(), compare=False, repr=False)
 
     @property
     def share(self) -> float:
@@ -38,8 +42,9 @@ class Recall:
 
     @property
     def ci95(self) -> tuple[float, float]:
-        """Return the Wilson interval [wilson1927] of the recall."""
-        return wilson(self.found, self.episodes)
+        """Return the Wilson interval [wilson1927] of the recall, of as many episodes as these are worth."""
+        each = worth([k for k, _ in self.by_drive], [n for _, n in self.by_drive], of_shares=True)
+        return wilson(each * self.found, each * self.episodes)
 
     @property
     def before_share(self) -> float:
@@ -57,11 +62,12 @@ class Recall:
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """Events counted over a time [s] and a way [m]."""
+    """Events counted over a time [s] and a way [m]; `by_drive`: events and time of each drive."""
 
     count: int
     seconds: float
     metres: float
+    by_drive: tuple[tuple[int, float], ...] = field(default=(), compare=False, repr=False)
 
     @property
     def per_hour(self) -> float:
@@ -70,8 +76,8 @@ class Rate:
 
     @property
     def per_hour_ci95(self) -> tuple[float, float]:
-        """Exact Poisson interval [garwood1936]. [1/h]"""
-        return _over(poisson(self.count), self.seconds / HOUR_S)
+        """Exact Poisson interval [garwood1936], of as many events as these are worth. [1/h]"""
+        return _over(self._expected(), self.seconds / HOUR_S)
 
     @property
     def per_100km(self) -> float:
@@ -80,8 +86,13 @@ class Rate:
 
     @property
     def per_100km_ci95(self) -> tuple[float, float]:
-        """Return the exact Poisson interval. [1/100 km]"""
-        return _over(poisson(self.count), self.metres / KM_100)
+        """Return the same. [1/100 km]"""
+        return _over(self._expected(), self.metres / KM_100)
+
+    def _expected(self) -> tuple[float, float]:
+        each = worth([k for k, _ in self.by_drive], [t for _, t in self.by_drive], of_shares=False)
+        low, high = poisson(each * self.count)
+        return low / each, high / each
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,9 +129,12 @@ def score(records: Sequence[RunRecord], detector: str) -> Score:
         detector=detector,
         runs=len(ran),
         unavailable=sum(detector in r.unavailable for r in records),
-        **{kind: recall_of(h for _, d in ran for h in getattr(d, kind)) for kind in kinds},
+        **{kind: recall_of(getattr(d, kind) for _, d in ran) for kind in kinds},
         false_alarms=Rate(
-            sum(len(d.false_alarms) for _, d in ran), sum(r.dry_s for r, _ in ran), sum(r.dry_m for r, _ in ran)
+            sum(len(d.false_alarms) for _, d in ran),
+            sum(r.dry_s for r, _ in ran),
+            sum(r.dry_m for r, _ in ran),
+            tuple((len(d.false_alarms), r.dry_s) for r, d in ran),
         ),
         on_water=Rate(sum(d.on_water for _, d in ran), sum(r.wet_s for r, _ in ran), 0.0),
     )
@@ -153,14 +167,16 @@ def confusion(records: Sequence[RunRecord]) -> dict[str, dict[str, Cell]]:
     return {row: {n: table[row][n] for n in names if n in table[row]} for row in order if row in table}
 
 
-def recall_of(hits: Iterable[Hit]) -> Recall:
-    """Count hits."""
-    all_hits = list(hits)
+def recall_of(drives: Iterable[Sequence[Hit]]) -> Recall:
+    """Count hits of each drive."""
+    each = list(drives)
+    all_hits = [h for hits in each for h in hits]
     return Recall(
         len(all_hits),
         sum(h.found for h in all_hits),
         sum(h.before for h in all_hits),
         tuple(h.latency for h in all_hits if not np.isnan(h.latency)),
+        tuple((sum(h.found for h in hits), len(hits)) for hits in each),
     )
 
 

@@ -38,8 +38,9 @@ _MATRICES = ("recall-matrix", "alarm-matrix")
 _CONFUSION = "Stretches with an event, also one that goes on from the stretch before; new events per hour"
 _NOTHING = ("", "-", "–", "- / -", "–/h")
 _FOOTER = (
-    "Intervals: Wilson [wilson1927] for shares, exact Poisson [garwood1936] for rates, 95 %. A false alarm is an event "
-    "that begins outside water and the second after it."
+    "Intervals: Wilson [wilson1927] for shares, exact Poisson [garwood1936] for rates, 95 %. Where those of a drive go "
+    "together they count as fewer [korn1998]; with one drive each counts as one. A false alarm is an event that begins "
+    "outside water and the second after it."
 )
 
 

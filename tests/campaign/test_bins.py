@@ -16,8 +16,9 @@ from aqualog.campaign.means import resistances, spin_ups
 from aqualog.campaign.measure import REASONS
 from aqualog.campaign.results import RunInfo, RunSamples
 from aqualog.campaign.slip_slope import Limits, at_zero_slip, slip_slopes
-from aqualog.campaign.spin_downs import minor_spin_downs
+from aqualog.campaign.spin_downs import _Part, _row, minor_spin_downs
 from aqualog.core.errors import ConfigError
+from aqualog.core.intervals import poisson
 from aqualog.core.notation import WHEELS
 from aqualog.model.programme import SEDAN, SUV
 from aqualog.physics.tyre_brush import brush_force
@@ -293,6 +294,17 @@ def test_minor_spin_downs_over_speed_and_the_speed_they_tell():
     cells = plan(deep_first, ["water-depth"])
     found = [f.group[0][1] for f in full_speeds(deep_first, cells, slip_slopes(deep_first, cells))]
     assert found == [1.3] * 5 + [11.0] * 5
+
+
+def test_events_that_come_together_in_a_pass_are_worth_fewer():
+    def row(counts):
+        return _row(((), "fl", 9), [_Part(2.0, 60.0, n, False, -0.05) for n in counts], 10.0)
+
+    even, clumped, alone = row([3] * 6), row([0, 0, 18, 0, 0, 0]), row([18])
+    assert even.per_s_ci == pytest.approx(np.array(poisson(18)) / 12.0)
+    assert alone.per_s_ci == pytest.approx(np.array(poisson(18)) / 2.0)
+    assert clumped.per_s_ci[0] < 0.1
+    assert clumped.per_s_ci[1] > 2.0 * even.per_s_ci[1]
 
 
 def test_a_pass_that_sweeps_the_speed_counts_where_its_wheel_stops():

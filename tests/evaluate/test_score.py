@@ -2,12 +2,15 @@
 
 import math
 
+import numpy as np
 import pytest
 
-from aqualog.core.intervals import wilson
+from aqualog.core.intervals import Z95, poisson, student_quantile, wilson, worth
+from aqualog.core.moments import Design
+from aqualog.core.regression import estimate
 from aqualog.evaluate.judge import beginning_in, cells_of, hits, outlasting, rows_of
 from aqualog.evaluate.labels import Label, Labels
-from aqualog.evaluate.records import Cell, DetectorRun, RunRecord
+from aqualog.evaluate.records import Cell, DetectorRun, Hit, RunRecord
 from aqualog.evaluate.score import Rate, confusion, grouped, recall_of, score
 
 WATER = [(10.0, 20.0)]
@@ -104,7 +107,8 @@ def test_scores_add_up():
     assert s.false_alarms == Rate(2, 5 * 3600.0, 5e5)
     assert s.false_alarms.per_hour == pytest.approx(0.4)
     assert s.false_alarms.per_100km == pytest.approx(0.4)
-    assert s.false_alarms.per_hour_ci95 == pytest.approx((0.2422 / 5, 7.2247 / 5), abs=2e-5)
+    assert Rate(2, 5 * 3600.0, 5e5).per_hour_ci95 == pytest.approx((0.2422 / 5, 7.2247 / 5), abs=2e-5)
+    assert s.false_alarms.per_hour_ci95[1] > 1.5 * 7.2247 / 5  # both on one of two drives
     assert s.full.ci95 == wilson(1, 2)
     assert {k: [r.name for r in v] for k, v in grouped(records, ["tyre"]).items()} == {
         ("new",): ["b", "c"], ("worn",): ["a"],
@@ -113,13 +117,47 @@ def test_scores_add_up():
 
 
 def test_missed_episodes_are_infinitely_late():
-    got = recall_of(
-        h for events in ([(12.0, 13.0)], [], []) for h in hits([(12.0, 13.0)], events, limit=0.5, water=WATER)
-    )
+    got = recall_of(hits([(12.0, 13.0)], events, limit=0.5, water=WATER) for events in ([(12.0, 13.0)], [], []))
     assert (got.episodes, got.found, len(got.latencies)) == (3, 1, 1)
     assert got.latency(0.3) == 0.0
     assert got.latency(0.5) == math.inf
     assert math.isnan(recall_of([]).share)
+
+
+def test_episodes_and_alarms_of_one_drive_count_as_fewer():
+    hit, miss = Hit(found=True, latency=0.1, before=False), Hit(found=False, latency=math.nan, before=False)
+    # ten drives that find all of their four episodes, or none: ten cases, not forty
+    clumped = recall_of([[hit] * 4] * 7 + [[miss] * 4] * 3)
+    assert clumped.ci95 == pytest.approx(wilson(7, 10), abs=0.05)
+    spread = recall_of([[hit, hit, hit, miss]] * 10)
+    assert spread.ci95 == wilson(30, 40)
+    assert recall_of([[hit, hit, miss]]).ci95 == wilson(2, 3)  # one drive does not show it
+    hour = 3600.0
+    once = Rate(12, 12 * hour, 0.0, ((1, hour),) * 12)
+    assert once.per_hour_ci95 == pytest.approx(np.array(poisson(12)) / 12.0)
+    of_one = Rate(12, 12 * hour, 0.0, ((12, hour), *((0, hour),) * 11))
+    assert of_one.per_hour_ci95[0] < 0.1
+    assert of_one.per_hour_ci95[1] > 4.0
+    assert Rate(0, 2 * hour, 0.0, ((0, hour),) * 2).per_hour_ci95 == pytest.approx((0.0, 3.6889 / 2), abs=1e-4)
+
+
+def test_clumped_events_are_held_as_often_as_said():
+    rng = np.random.default_rng(1)
+    held, draws = 0, 150
+    for _ in range(draws):
+        counts = rng.poisson(rng.gamma(1.0, 3.0, 8))
+        each = worth(counts, np.ones(8), of_shares=False)
+        low, high = poisson(each * counts.sum())
+        held += low / each <= 24.0 <= high / each
+    assert held >= 0.87 * draws  # 0.92; 0.68 as if each event came alone
+    # as the regression over runs has it, with runs of unequal length
+    counts, sizes = np.array([3.0, 9.0, 1.0, 20.0]), np.array([1.0, 2.0, 1.5, 4.0])
+    order = np.arange(4)
+    e = estimate(Design(np.sqrt(sizes)[None], counts / np.sqrt(sizes), order, 0 * order, (False,), (False,)))
+    effect = float(e.by_run[0].part @ e.by_run[0].part) * sizes.sum() ** 2 / counts.sum()
+    dof = float(e.dof[0]) * (effect / (effect - 1.0)) ** 2
+    wanted = (Z95 / student_quantile(0.975, dof)) ** 2 / effect
+    assert worth(counts, sizes, of_shares=False) == pytest.approx(wanted, rel=1e-4)
 
 
 def test_configurations_are_sorted_as_numbers():

@@ -202,7 +202,7 @@ _RECALL = (
     count("episodes", "episodes of that effect"),
     count("found", "episodes found in time: full within 0.5 s, partial within 2 s"),
     number("recall", "-", "share", null=True),
-    interval("ci95", "-", "95 % interval (Wilson [wilson1927])"),
+    interval("ci95", "-", "95 % interval (Wilson [wilson1927], by drive)"),
     *or_null(
         number("warned_before", "-", "share in which the warning was there before"),
         number("latency_median_s", "s", "median time to the warning; null: never"),
@@ -221,7 +221,7 @@ _SCORE = (
         count("count", "events"),
         number("hours", "h", "time outside water"),
         number("per_hour", "1/h", "rate", null=True),
-        interval("per_hour_ci95", "1/h", "95 % interval (exact Poisson)"),
+        interval("per_hour_ci95", "1/h", "95 % interval (exact Poisson, by drive)"),
         *with_ci("per_100km", "1/(100 km)", "rate over the way"),
     )),
     obj("on_water", "events on water with a contact above 0.7", (
