@@ -6,6 +6,8 @@ import math
 from collections.abc import Collection, Container, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from aqualog.calibrate import words
 from aqualog.calibrate.balance import Balance, Sample, fit_balance
 from aqualog.calibrate.records import Parameter, TieRodFit
@@ -14,6 +16,8 @@ from aqualog.core.errors import ConfigError
 from aqualog.core.intervals import Z95
 from aqualog.core.provenance import provenance_of, uncertainty
 from aqualog.core.vehicle import KEYS, WATER, Provenance, Vehicle, WaterNumber
+from aqualog.physics.load import G
+from aqualog.physics.rolling import rolling_rise
 
 __all__ = [
     "FIXABLE", "GAIN_SD", "balance_parameters", "calibrated", "check_fixed", "contradicted", "derived", "estimates",
@@ -27,6 +31,8 @@ FIXABLE: Mapping[str, tuple[float, float]] = {
 """Values that can be given as known, with their bounds."""
 
 GAIN_SD = 0.02  # [-] of a torque signal whose scale nobody has checked (K; axle efficiency alone is 0.95-0.97, V)
+RISE_SD = 3.0**-0.5
+"""[-] rms rise of a tyre's rolling resistance with speed over that of MF6.1: evenly between none and all of it (K)."""
 WIDE: Mapping[str, float] = {"mass": 0.10, "torque_gain": 0.10, "mass_per_gain": 0.10, "drag_area": 0.5}
 """Half of an interval over its value beyond which a parameter is not identified."""
 WIDE_ROLLING = (
@@ -75,6 +81,22 @@ def estimates(samples: Sequence[Sample], fixed: Mapping[str, float]) -> dict[str
     return derived(fit_balance(samples, fixed), fixed)
 
 
+def _model_terms(found: Mapping[str, float], samples: Sequence[Sample], fixed: Mapping[str, float]) -> dict[str, float]:
+    """What a rolling resistance that rises with speed does to drag area and rolling resistance: standard deviations.
+
+    The balance has a constant part and one that goes with v^2, and takes such a rise for drag. It is the car's own, so
+    that more drives do not reduce it. The rolling resistance is that at the speeds driven.
+    """
+    rises = [rolling_rise(s.windows.v) for s in samples]
+    mean = float(np.concatenate(rises).mean())
+    moved = [
+        s._replace(windows=s.windows._replace(a_x=s.windows.a_x - G * (rise - mean)))
+        for s, rise in zip(samples, rises, strict=True)
+    ]
+    other = estimates(moved, fixed)
+    return {n: RISE_SD * abs(other[n] - found[n]) for n in ("drag_area", "rolling_resistance")}
+
+
 def balance_parameters(
     found: Mapping[str, float], spread: Spread, fixed: Mapping[str, float], vehicle: Vehicle, samples: Sequence[Sample],
     rotating: float = 0.0,
@@ -82,8 +104,10 @@ def balance_parameters(
     """Return the parameters of the balance with intervals, and why one is not identified.
 
     Without a given mass or torque gain, the gain's 2 % enter the intervals of mass and drag area. All drives share the
-    one signal, so more drives do not reduce this part. Nor do they that of inertias and radii, see `rotating_share`.
+    one signal, so more drives do not reduce this part. Nor do they that of inertias and radii, see `rotating_share`,
+    and that of a rolling resistance that rises with speed, see `_model_terms`.
     """
+    of_model = _model_terms(found, samples, fixed)
     has_scale = "mass" in fixed or "torque_gain" in fixed
     parameters: list[Parameter] = []
     for name, unit in _UNITS.items():
@@ -93,7 +117,7 @@ def balance_parameters(
             continue
         half = half_width(spread.sd[name], spread.dof[name])
         shared = rotating * value if name in ("mass_per_gain", "mass", "torque_gain") else 0.0
-        half = math.hypot(half, 1.96 * shared)
+        half = math.hypot(half, 1.96 * shared, 1.96 * of_model.get(name, 0.0))
         if name in ("mass", "drag_area") and not has_scale:
             half = math.hypot(half, 1.96 * GAIN_SD * value)
         limit = WIDE_ROLLING if name == "rolling_resistance" else WIDE[name] * value

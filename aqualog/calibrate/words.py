@@ -111,6 +111,9 @@ def remark(name: str, *, has_scale: bool, by_drive: bool, samples: Sequence[Samp
         parts.append("inertias and radii as sure as the vehicle file says")
     if name == "drag_area":
         parts.append("with the air density of the vehicle file")
+        parts.append("all that goes with v²: a rise of the rolling resistance with speed is in it, and in the interval")
+    if name == "rolling_resistance":
+        parts.append("the constant part: what rises with speed is in the drag area, and in the interval")
     if name == "rolling_resistance" and not all(s.offset.has_height for s in samples):
         parts.append(f"net climb of a drive taken as 0 ± {CLIMB_SD:g} m")
     parts.append(

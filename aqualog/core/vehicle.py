@@ -69,7 +69,7 @@ _ALL = [
     Key("wheels", "inertia_r", "kg*m^2", 1.15, 0.05, 50.0, "wheel inertia, rear", "1.0-1.2 per wheel (K)"),
     Key(
         "tyre", "slip_slope_f", "-", 31.0, 1.0, 200.0, "C_s / F_z on dry road, front",
-        "31.7 +- 3.5 (V, [gustafsson2000])",
+        "guess (K): 26 to 42 in the parts of one drive [gustafsson2000]",
     ),
     Key("tyre", "slip_slope_r", "-", 31.0, 1.0, 200.0, "C_s / F_z on dry road, rear", "as front"),
     Key("tyre", "mu_max", "-", 1.02, 0.05, 3.0, "friction of tyre and dry road", "dry asphalt (K)"),
