@@ -189,7 +189,8 @@ def _legend(test: TradeTest) -> str:
         told = f"v_x is late by {median(late):.2f} s (median of {len(late)} runs): taken off.\n" if late else ""
         level = o.limits.straight.level
         return told + (
-            f"v_05, minor spin-down, slip slope: other signs of lost contact, before or after {level}; means of the runs that show them.\n"
+            f"v_05, minor spin-down, slip slope: other signs of lost contact, before or after {level}; "
+            "means of the runs that show them.\n"
             f"Where runs did not reach {level}, they count as above their highest speed."
         )
     if o.kind == "braking":
