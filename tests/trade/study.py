@@ -108,15 +108,20 @@ def faulty(car: Vehicle, kind: str, tyre: int, seed: int) -> Made:
     return measured(scenario, tyre, shift if kind == "shift" else lose)
 
 
-def judged(runs: list[Made]) -> list[bool]:
-    """Whether each run counts, in its set (runs of a tyre)."""
+def in_sets(runs: list[Made]) -> tuple[Entry, ...]:
+    """Each run as it stands in its set (runs of a tyre)."""
     entries = [Entry(f"{i}", 1, float(i), (("tyre", str(m.tyre)),), str(m.tyre), m.found) for i, m in enumerate(runs)]
-    return [e.valid for e in evaluated(entries, Options("straight", defaults(), ("tyre",))).entries]
+    return evaluated(entries, Options("straight", defaults(), ("tyre",))).entries
+
+
+def judged(runs: list[Made]) -> list[bool]:
+    """Whether each run counts."""
+    return [e.valid for e in in_sets(runs)]
 
 
 def bias(pool: list[Made]) -> str:
-    kept = [m for m, ok in zip(pool, judged(pool), strict=True) if ok and not m.found.is_censored]
-    away = np.array([KMH * m.found.v - m.truth for m in kept])
+    kept = [(m, e) for m, e in zip(pool, in_sets(pool), strict=True) if e.valid and not e.is_censored]
+    away = np.array([e.value - m.truth for m, e in kept])
     reasons = Counter(re.sub(r"[\d.]+", "#", r) for m in pool for r in m.found.reasons)
     return (
         f"bias {away.mean():+.3f} km/h, sd {away.std():.3f}, largest {np.abs(away).max():.2f}, of {away.size} valid runs "
@@ -180,7 +185,8 @@ def drift(pool: list[Made], sessions: int = 200, change: float = -0.05) -> str:
             own = [m for m in pool if m.tyre == tyre]
             f = own[rng.integers(len(own))].found
             scale = 1.0 + change * i / (len(plan) - 1)
-            f = replace(f, speeds={n: v * scale for n, v in f.speeds.items()}, v_bound=f.v_bound * scale)
+            own, other = ({n: v * scale for n, v in x.items()} for x in (f.speeds, f.speeds_other))
+            f = replace(f, speeds=own, speeds_other=other, v_bound=f.v_bound * scale)
             entries.append(Entry(f"{i}", 1, float(i), (("tyre", str(tyre)),), str(tyre), f))
         test = evaluated(entries, Options("straight", defaults(), ("tyre",), str(control)))
         base = next(s for s in test.sets if s.is_control).summary.mean
