@@ -98,7 +98,9 @@ def _at_place(found: Found, group: Sequence[Candidate[Option]], model: Model) ->
     best = min(s.sharp for s in sharp)
     as_good = [s for s in sharp if COARSE * (s.sharp - best) < 2.0 * math.log(PLACES)]
     picked = max(as_good, key=lambda s: (whole(s), s.share))
-    torn = (s for s in as_good if s.share > picked.share / PLACES and s.names == picked.names and _apart(s, picked))
+    # what was not refitted has its share of straight lines
+    open_to = [*as_good, *(s for s in group if s.option.refit is None)]
+    torn = (s for s in open_to if s.share > picked.share / PLACES and s.names == picked.names and _apart(s, picked))
     return replace(picked, torn=tuple(torn))
 
 

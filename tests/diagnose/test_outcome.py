@@ -225,6 +225,20 @@ def test_only_what_is_worth_naming_is_asked_whether_it_repeats(monkeypatch):
     assert asked == [{("payload_mass", "")}]
 
 
+def test_a_place_that_was_not_refitted_is_open_too(monkeypatch):
+    from aqualog.diagnose.search import Option
+    from aqualog.diagnose.verdict import Candidate
+
+    def at(where, share, refit):
+        cause = Cause("tyre_radius", where, {}, (), "")
+        return Candidate(Option((), 0.0, refit), ((cause, True),), 0.0, share)
+
+    monkeypatch.setattr(outcome, "sharpened", lambda *_: (None, 1.0))
+    for share, places in ((0.2, ["fr"]), (0.1, [])):  # a fifth decides
+        group = [at("fl", 0.6, True), at("fr", share, None), at("f", 0.5, None)]
+        assert [s.large[0].where for s in outcome._at_place(None, group, None).torn] == places
+
+
 def test_what_is_certain_is_not_called_open():
     from aqualog.diagnose.records import Cause
     from aqualog.diagnose.words import verdict_sentence
