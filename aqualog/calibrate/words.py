@@ -111,14 +111,16 @@ def remark(name: str, *, has_scale: bool, by_drive: bool, samples: Sequence[Samp
         parts.append("inertias and radii as sure as the vehicle file says")
     if name == "drag_area":
         parts.append("with the air density of the vehicle file")
-        parts.append("all that goes with v²: a rise of the rolling resistance with speed is in it, and in the interval")
+        parts.append("the part that goes with v²")
     if name == "rolling_resistance":
-        parts.append("the constant part: what rises with speed is in the drag area, and in the interval")
+        parts.append("the constant part")
     if name == "rolling_resistance" and not all(s.offset.has_height for s in samples):
         parts.append(f"net climb of a drive taken as 0 ± {CLIMB_SD:g} m")
-    parts.append(
-        "a steady wind of 3 m/s rms" + (" and drives left out are" if by_drive else " is") + " in the interval"
-    )
+    wide = ["a steady wind of 3 m/s rms"]
+    wide += ["a rise of rolling resistance with speed"] if name in ("drag_area", "rolling_resistance") else []
+    wide += ["drives left out"] if by_drive else []
+    listed = " and ".join(x for x in (", ".join(wide[:-1]), wide[-1]) if x)
+    parts.append(f"{listed} {'are' if len(wide) > 1 else 'is'} in the interval")
     return "; ".join(parts)
 
 

@@ -120,11 +120,11 @@ def worth(counts: Sequence[float], sizes: Sequence[float], *, of_shares: bool) -
     of_shares : bool
         Whether sizes are cases, each with one event at most.
 
-    The variance of the ratio of the sums from run to run (CR2, as `aqualog.core.regression` has it for one column),
-    over that of single events, is the design effect. Intervals of single events with counts so much smaller, and with
-    Student's t in place of the normal quantile, are those of Korn and Graubard [korn1998]. The degrees of freedom are
-    those of the part between the runs [satterthwaite1946]: that of single events is known. Effects below 1 are chance.
-    With one run, without an event, or with one in each case, it does not show whether they come together: 1.
+    The design effect is the variance of the ratio of the sums from run to run ([bell2002], one column of
+    `aqualog.core.regression`) over that of single events. Counts so much smaller, and Student's t in place of the
+    normal quantile, give the intervals of [korn1998]. The degrees of freedom are those of the part between the runs
+    [satterthwaite1946]: that of single events is known. With one run, without an event, or with one in each case, it
+    does not show whether they come together: 1.
     """
     y, x = (np.asarray(v, dtype=np.float64) for v in (counts, sizes))
     y, x = y[x > 0.0], x[x > 0.0]

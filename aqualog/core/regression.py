@@ -216,7 +216,7 @@ def _huber_weights(d: Design, first: Index, m: Moments, w: _Working, value: Floa
 
 class ByRun(NamedTuple):
     """What each run does to an estimate, arrays (g,): its `run`, its `part` in the error, whose squares add up to the
-    variance (CR2), and its `share` in the information. Estimates from the same runs err together by their parts.
+    variance [bell2002], and its `share` in the information. Estimates from the same runs err together by their parts.
     """
 
     run: Index = np.zeros(0, dtype=np.int64)
@@ -346,7 +346,7 @@ def _half_widths(m: Moments, k: FloatArray, value: FloatArray) -> tuple[FloatArr
 
 
 def degrees_of_freedom(omega: FloatArray) -> float:
-    """Satterthwaite's degrees of freedom of a sum of squares, from the covariance (g, g) of its terms."""
+    """Degrees of freedom of a sum of squares [satterthwaite1946], from the covariance (g, g) of its terms."""
     power = float(np.vdot(omega, omega))
     return max(float(np.trace(omega)) ** 2 / power, 1.0) if power > 0.0 else 1.0
 

@@ -273,9 +273,9 @@ def line_of_logs(rows: Sequence[SlopeRow], columns: Sequence[FloatArray]) -> lis
 
     Weights come from each bin's own error and from the additional scatter about the line. The scatter is DerSimonian
     and Laird's moment [dersimonian1986] for errors that hang together, repeated until it converges. A run passes
-    through several bins, and both wheels of an axle share it: the errors of the bins are put together run by run (CR2
-    of `aqualog.core.regression`). The interval is Student's, with Satterthwaite's degrees of freedom of the runs, or
-    bins minus columns where these are fewer.
+    through several bins, and both wheels of an axle share it: the errors of the bins are put together run by run, as
+    `aqualog.core.regression` has them [bell2002]. The interval is Student's, with the degrees of freedom of the runs
+    [satterthwaite1946], or bins minus columns where these are fewer.
     """
     x = np.stack(columns, axis=1)
     n, p = x.shape

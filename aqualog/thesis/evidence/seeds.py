@@ -214,7 +214,7 @@ def widened(value: float, ends: tuple[float, float], n: int, *, of: int = 1) -> 
     """A bootstrap's 95 % interval for few units, by Student's t, as in `aqualog.diagnose.gain`.
 
     Resamples of n vary less than samples do, by (n - 1) / n, and few of them do not show how much. `of` intervals hold
-    together by Bonferroni's inequality.
+    together [bonferroni1936].
     """
     if n < 2 or not math.isfinite(value):
         return ends
