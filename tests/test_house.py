@@ -12,7 +12,7 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 96_990
+MOST_LINES = 96_991
 MOST_FILES = 502
 MOST_TEST_LINES = 71_566
 MEDIAN_MODULE = 182

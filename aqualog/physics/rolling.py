@@ -108,5 +108,6 @@ def rolling_rise(v: FloatArray) -> FloatArray:
 
     Source: the law of [besselink2010] with the coefficients of a published set.
     """
-    u = v / 16.67
-    return np.asarray(0.001515 * u + 8.5e-5 * u**4)
+    u: FloatArray = v / 16.67
+    rise: FloatArray = 0.001515 * u + 8.5e-5 * u**4
+    return rise
