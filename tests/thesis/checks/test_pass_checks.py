@@ -120,17 +120,19 @@ def test_the_interval_of_a_mean_holds_what_theory_says():
 def test_intervals_hold_with_few_seeds_and_for_the_one_that_is_chosen():
     rng = np.random.default_rng(0)
     of_mean = extreme = plain = 0
-    for _ in range(200):
+    for k in range(200):
         x = rng.normal(0.0, 1.0, (6, 6))
         low, high = seeds.bootstrap(x[0])
         of_mean += low <= 0.0 <= high
+        if k >= 120:
+            continue
         _, (low, high) = max(seeds.estimate(seeds.mean_of(own), 6, of=6) for own in x)
         extreme += low <= 0.0 <= high
         _, (low, high) = max(seeds.estimate(seeds.mean_of(own), 6) for own in x)
         plain += low <= 0.0 <= high
     assert of_mean >= 180  # 190 on average; 172 by percentiles alone
-    assert extreme >= 180
-    assert plain < 180  # the interval of the largest one does not know that it was chosen
+    assert extreme >= 112
+    assert plain < 112  # the interval of the largest one does not know that it was chosen
     assert seeds.widened(2.0, (1.0, np.inf), 5)[1] == np.inf
 
 
