@@ -22,7 +22,8 @@ class Row:
     `target`: the ratio of the peer's cost to ours that is to be reached. `clock`: "cpu" or "wall". `cost`: what a call
     took where its result tells it and no clock here does (of a process, of memory, of a page), in `unit`. `work`: how
     much of the same work a call of ours does, `peer_work` one of the peer: the ratio is per unit. A peer that is a
-    number is a cost, such as real time. `needs`: modules of the peer, without which the row is not run.
+    number is a cost, such as real time. `needs`: modules of the peer, without which the row is not run. `is_once`: a
+    process does this once, so that each side starts with memory given back.
     """
 
     name: str
@@ -39,6 +40,7 @@ class Row:
     cost: Callable[[Any], float] | None = None
     unit: str = "s"
     needs: tuple[str, ...] = ()
+    is_once: bool = False
 
     @property
     def is_runnable(self) -> bool:
@@ -76,7 +78,8 @@ def measured(row: Row, rounds: int | None = None) -> Measured:
 
 
 def _cost(row: Row, call: Callable[[], Any]) -> float:
-    _give_back_memory()
+    if row.is_once:
+        _give_back_memory()
     clock = time.perf_counter if row.clock == "wall" else time.process_time
     begin = clock()
     result = call()
