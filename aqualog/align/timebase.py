@@ -250,18 +250,28 @@ def without_copies(channels: Mapping[_Key, Channel]) -> tuple[dict[_Key, Channel
 def with_spread_stamps(channels: Mapping[_Key, Channel]) -> tuple[dict[_Key, Channel], tuple[str, ...]]:
     """Spread samples that share rounded stamps, as of 100 Hz written with one decimal, evenly between the stamps.
 
-    Returns the channels, and a note for each file with such stamps. What repeats its values is no sample of its own.
+    Returns the channels, and a note for each file with such stamps. Channels with the same stamps stay together: one
+    that moves shows that each row is a sample; where all of them repeat their values, no row is one of its own.
     """
+    of_last = OfLast(_spread)
+    found = {key: own for key, c in channels.items() if (own := of_last(c.t_ns)) is not None}
+
+    def clock(c: Channel) -> tuple[str, int, int, int]:
+        return c.info.file, c.t_ns.size, int(c.t_ns[0]), int(c.t_ns[-1])
+
+    def moves(c: Channel) -> bool:
+        same = np.diff(c.t_ns) == 0
+        return 2 * int((np.diff(c.values)[same] != 0.0).sum()) >= int(same.sum())
+
+    moving = {clock(channels[key]) for key in found if moves(channels[key])}
     spread = dict(channels)
     notes: dict[str, str] = {}
-    of_last = OfLast(_spread)
-    for key, c in channels.items():
-        found = of_last(c.t_ns)
-        same = np.diff(c.t_ns) == 0
-        if found is None or 2 * int((np.diff(c.values)[same] != 0.0).sum()) < int(same.sum()):
+    for key, (t_ns, *steps) in found.items():
+        c = channels[key]
+        if clock(c) not in moving:
             continue
-        spread[key] = replace(c, t_ns=found[0])
-        step, period = (f"{x * 1e-9:.4g} s" for x in found[1:])
+        spread[key] = replace(c, t_ns=t_ns)
+        step, period = (f"{x * 1e-9:.4g} s" for x in steps)
         what = f"its time stamps are rounded to {step}; samples that share one are spread evenly, {period} apart"
         notes.setdefault(c.info.file, f"{c.info.file}: {what}")
     return spread, tuple(notes.values())

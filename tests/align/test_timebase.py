@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -171,6 +173,9 @@ def test_rounded_stamps_are_spread_evenly(rounding, step):
     spread, notes = with_spread_stamps({"x": Channel(info, (rounding(t / step) * step).astype(np.int64), x, False)})
     assert np.abs(spread["x"].t_ns - t).max() < 0.5 * MS
     assert f"rounded to {step / S:g} s" in notes[0]
+    state = Channel(info, (rounding(t / step) * step).astype(np.int64), (t > t[3000]).astype(float), False)
+    both = with_spread_stamps({"x": replace(state, values=x), "state": state})[0]
+    assert np.array_equal(both["state"].t_ns, both["x"].t_ns)  # what rests keeps step with what moves
     held = np.repeat(x[::100], 100)  # what repeats its values is no sample of its own
     assert with_spread_stamps({"x": Channel(info, t // step * step, held, False)})[1] == ()
     assert with_spread_stamps({"x": Channel(info, t, x, False)})[1] == ()
