@@ -189,9 +189,11 @@ class FeatureStream:
                 )  # fmt: skip
         # a wheel that slows down faster than the car gives its momentum to the water, not to the car: only a wheel that
         # spins up has taken torque from the road, else every spin-down would look like resistance; a wheel that shakes
-        # does both in turn, and has both
-        lag = omega_dot - _middle(omega_dot)
-        spinning_up = np.where(lag < -SPIN_DOWN / self._r_e[:, None], omega_dot - lag, omega_dot)
+        # does both in turn, and has both; one whose signal is missing is taken to turn as the others
+        middle = _middle(omega_dot)
+        with np.errstate(invalid="ignore"):
+            turns = omega_dot - middle >= -SPIN_DOWN / self._r_e[:, None]
+        spinning_up = np.where(turns, omega_dot, middle)
         out["torque_sum"] = torque[0] + torque[1] + torque[2] + torque[3]
         if "a_x" in self.available:
             a_nom = nominal_acceleration(

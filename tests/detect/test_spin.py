@@ -157,6 +157,8 @@ def test_shaken_wheels_are_no_resistance(inertia):
         for c in ({n: s.array(n) for n in s.symbols}, columns)
     ]
     assert means[1] == pytest.approx(means[0], abs=0.004)
+    gap = {**columns, "omega_fl": np.where((s.array("t") > 9.0) & (s.array("t") < 10.0), np.nan, columns["omega_fl"])}
+    assert np.isfinite(FeatureStream(car, s.dt, list(gap)).push(gap)["delta_a_x"][300:]).all()
 
 
 def seen(v_ref, v_w, a_x):
