@@ -46,13 +46,14 @@ def deviation(h: Hypothesis, name: str, vehicle: Vehicle) -> float:
 
 def own_sd(vehicle: Vehicle, path: str) -> float:
     """Standard deviation of the file's own value of a key, in the key's unit; 0 for a mass and a gain that are bound:
-    once drives have calibrated one of them, their ratio is known. A file that says of no value where it comes from is
-    taken at its word; only axles whose key it does not set are those of another car."""
+    once drives have calibrated one of them, their ratio is known. A mass from a data sheet was not there when a gain
+    was calibrated, which would have made it calibrated, or measured. A file that says of no value where it comes from
+    is taken at its word; only axles whose key it does not set are those of another car."""
     if not vehicle.provenance and (path in vehicle.given or not path.endswith(("_f", "_r"))):
         return 0.0
-    bound = ("mass", "torque_gain")
-    is_known = path in bound and any(provenance_of(vehicle, p).source == "calibrated" for p in bound)
-    return 0.0 if is_known else uncertainty(vehicle, path)
+    mass, gain = (provenance_of(vehicle, p).source for p in ("mass", "torque_gain"))
+    is_bound = mass == "calibrated" or (gain == "calibrated" and mass == "measured")
+    return 0.0 if is_bound and path in ("mass", "torque_gain") else uncertainty(vehicle, path)
 
 
 def with_known(model: Model, vehicle: Vehicle) -> Model:

@@ -56,7 +56,8 @@ def test_deviation_in_the_unit_of_the_effect(name, where, sd):
     ("mass", "gain", "of_mass", "of_gain"),
     [
         ("measured", "guess", 10.0, 0.2), ("data_sheet", "data_sheet", 42.0, 0.05), ("calibrated", "guess", 0.0, 0.0),
-        ("guess", "calibrated", 0.0, 0.0), ("guess", "guess", 112.0, 0.2),
+        ("measured", "calibrated", 0.0, 0.0), ("data_sheet", "calibrated", 42.0, 0.01),  # no drive has seen such a mass
+        ("guess", "calibrated", 112.0, 0.01), ("guess", "guess", 112.0, 0.2),
     ],
 )  # fmt: skip
 def test_mass_and_gain_are_sure_as_a_ratio_once_drives_have_shown_it(mass, gain, of_mass, of_gain):
