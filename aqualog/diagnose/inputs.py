@@ -45,6 +45,7 @@ STEER_S = 0.5  # [s]
 V_MIN = 4.0  # [m/s] below it, creeping, clutch and standstill dominate
 A_MOST = 3.0  # [m/s^2] of replaced torque beyond resistance: with more, the simulated car spins in a curve
 UNEXPLAINED = 0.8  # [m/s^2] more than a grade of 8 %
+IDLE = 0.3  # [m/s^2] nobody drives the car further while braking
 OFTEN = 0.01  # share of the driving
 LEAST_S = 20.0  # [s] of usable driving
 BRAKE_PRESSURE = 0.5e5  # [Pa]
@@ -237,10 +238,12 @@ def _acceleration(v: FloatArray, dt: float) -> FloatArray:
 
 
 def brakes_unlogged(torque: FloatArray, v: FloatArray, wet: BoolArray, vehicle: Vehicle, dt: float) -> bool:
-    """Whether the car often slows down much more than torque and resistance explain off the water, so by braking."""
+    """Whether the car often slows down much more than torque and resistance explain off the water, so by braking. One
+    that speeds up less than its torque says pulls a trailer, or has another gain."""
     a = _acceleration(v, dt)
-    explained = smooth(torque.sum(axis=0), dt, SPEED_S) / (vehicle.arm("fl") * vehicle.mass) - roll_out(v, vehicle)
+    driven = smooth(torque.sum(axis=0), dt, SPEED_S) / (vehicle.arm("fl") * vehicle.mass)
     moving = (v > V_MIN) & ~wet
     if moving.sum() * dt < LEAST_S:
         return False
-    return bool(((a < explained - UNEXPLAINED) & moving).sum() > OFTEN * moving.sum())
+    braked = (a < driven - roll_out(v, vehicle) - UNEXPLAINED) & (a < 0.0) & (driven < IDLE)
+    return bool((braked & moving).sum() > OFTEN * moving.sum())

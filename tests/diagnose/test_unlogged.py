@@ -63,6 +63,13 @@ def test_climbing_at_speed_is_no_brake():
     assert brakes_unlogged(still, braking, off, car, DT)
 
 
+def test_a_car_that_speeds_up_less_than_its_torque_says_is_not_braked():
+    """A trailer does that, a load, another gain or a late speed: the torque of braking may be in the log all the same."""
+    v, off = 10.0 + 2.0 * np.resize(np.arange(500) * DT, 2500), np.zeros(2500, dtype=bool)
+    driven = np.full((4, 2500), 0.25 * 4.0 * CAR.mass * CAR.arm("fl"))
+    assert not brakes_unlogged(driven, v, off, CAR, DT)
+
+
 @pytest.mark.parametrize(
     ("gain", "drag", "motor", "held"),
     [(1.0, 330.0, 0.0, False), (1.0, 330.0, 1.0, True), (0.8, 330.0, 1.0, True), (1.0, 0.0, 0.75, False)],
