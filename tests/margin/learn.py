@@ -4,6 +4,8 @@
     python -m tests.margin.learn --same-roads    # kinds of road stay as the file has them
     python -m tests.margin.learn --passes 0 --one-side 900 --others 360    # only snow under one side is learnt, and what
                                                  # the rear axle shows of it and of water there; the rest stays
+    python -m tests.margin.learn --steady 6000 --first 1200000    # only wet kinds of cars that have been in the water for
+                                                 # long; the rest stays
 
 Windows come from passes whose tyres are drawn by `passes.any_tyre`, from dry drives of the tuning pool, and from drives
 on snow, ice and gravel. What is compared with is learnt from the dry road before, by the filter itself, which is told
@@ -37,6 +39,7 @@ from tests.margin.passes import LAWS, own_pass
 DRIVETRAINS = ("rwd", "fwd", "awd")
 DISTANCE = (-20.0 * KMH, 100.0 * KMH)
 WATER, EDGE = (0.8, 1.4, 2.0, 2.6, 3.2, 3.7), (0.2, 0.3, 0.4, 0.5, 0.7)  # [s] behind the begin of the water
+STEADY, LONG = (0.8, 1.4, 2.0, 2.6, 3.2, 4.0, 5.0, 6.0, 7.0, 8.0), 9.0  # [s] the same of such that stay so long
 OTHER = 3  # surface: snow, ice, gravel
 GRIPS = float(np.arcsinh(0.02 / FilterParams._field_defaults["scale_D"]))  # 2 % of slip
 WET = 0.6  # [-] log ratio up to which water counts as such
@@ -47,7 +50,7 @@ SHARP = 1.0  # how surely a slip of 1 in its feature tells which way a wheel goe
 SHARES = (0.6, 0.1, 0.3)  # of `LAWS` (K)
 OF_TEN = (0, 0, 0, 0, 0, 0, 1, 2, 2, 2)  # the same among passes with water under one side alone
 ONE_SIDE, SHARE_ONE = len(LAWS), 0.25  # its law, of all others together; its share of wet road, that of snow above (K)
-KINDS, KINDS_ONE = 8, 4  # of dry road, as many of wet, and of other surfaces; of each of these under one side
+KINDS, KINDS_STEADY, KINDS_ONE = 8, 12, 4  # of dry, wet, other roads; of wet ones by the traction; under one side
 LEAST = 1e-3  # [-] of a variance
 _N, _Z = len(state.FEATURES), state.COVARIATES
 NEUTRAL = Emissions(
@@ -78,11 +81,16 @@ def laws_of(x, z, where, share):
     return mean, scatter
 
 
-def _kinds(left, S, share):
-    """Probability of each kind (kinds, n), and squared distance from its mean."""
+def _logs(left, S, share):
+    """Log likelihood of each kind (kinds, n), less what all have in common, and squared distance from its mean."""
     square = np.einsum("kni,kij,knj->kn", left, np.linalg.inv(S), left)
     logs = np.log(share)[:, None] - 0.5 * np.linalg.slogdet(S)[1][:, None]
-    logs = logs - 0.5 * (TAIL + _N) * np.log1p(square / TAIL)
+    return logs - 0.5 * (TAIL + _N) * np.log1p(square / TAIL), square
+
+
+def _kinds(left, S, share):
+    """Probability of each kind (kinds, n), and squared distance from its mean."""
+    logs, square = _logs(left, S, share)
     return np.exp(logs - np.logaddexp.reduce(logs)), square
 
 
@@ -103,6 +111,16 @@ def kinds_of(x, z, rng, kinds=KINDS):
         left = x - z @ mean[:, :, :used].transpose(0, 2, 1)
         S = np.einsum("kn,kni,knj->kij", w, left, left) / r.sum(axis=1)[:, None, None] + LEAST * np.eye(_N)
     return mean, S, share
+
+
+def best_kinds_of(x, z, kinds, starts=6):
+    """The likeliest of several mixtures: each depends on the windows that it starts from."""
+
+    def fits(found):
+        mean, S, share = found
+        return float(np.logaddexp.reduce(_logs(x - z @ mean.transpose(0, 2, 1), S, share)[0]).sum())
+
+    return max((kinds_of(x, z, np.random.default_rng(k), kinds) for k in range(starts)), key=fits)
 
 
 def rear_of(x, z, rear, kinds):
@@ -242,6 +260,32 @@ def of_law(rows):
         yield *laws_of(x[:, :_N], x[:, _N:], ratio, share), contact, ways
 
 
+def steady_passes(first, number):
+    """Rows of drivetrain, log ratio and window of cars that stay in the water: by then they drive against it."""
+    for n in range(number):
+        d = n % 3
+        p = own_pass(first + n, DRIVETRAINS[d], distance=DISTANCE, law=n // 3 % len(LAWS), stay=LONG)
+        x = windows(p.columns, p.vehicle, p.dt, p.wet)
+        for k in (round((p.wet[0] + after) / 0.1) for after in STEADY):
+            if k < len(x):
+                yield d, np.log(p.v_full / 30.0) - x[k, _N + 1], *x[k]
+
+
+def with_steady(t, rows):
+    """Emissions with wet kinds whose slips follow the traction, as likely in all as those that do not, from `rows`."""
+    rows = rows[np.isfinite(rows[:, 2 : 2 + _N + _Z]).all(axis=1)]
+    x = rows[rows[:, 1] < WET, 2:]
+    own, first = np.flatnonzero(t.road == 1.0)[:KINDS], 2 * KINDS
+    *new, share = best_kinds_of(x[:, :_N], x[:, _N : _N + _Z], KINDS_STEADY)
+    rest = t.road.size - 2 * KINDS_ONE - KINDS  # other surfaces, and those under one side, are the last
+    whole = (1.0 - SHARE_ONE) / 2.0
+    prior = np.concatenate([t.kind_prior[own] * whole / t.kind_prior[own].sum(), share * whole])
+    tables = {n: np.concatenate([a[:first], b, a[rest:]]) for n, a, b in (
+        ("kind_mean", t.kind_mean, new[0]), ("kind_scatter", t.kind_scatter, new[1]), ("road", t.road, np.ones(share.size)),
+    )}  # fmt: skip
+    return t._replace(**tables, kind_prior=np.concatenate([t.kind_prior[:KINDS], prior, t.kind_prior[rest:]]))
+
+
 def learn(found, kept=()):
     """Emissions by drivetrain from rows of windows; `kept` of the file at hand: "distances" and "roads".
 
@@ -261,9 +305,11 @@ def learn(found, kept=()):
         distances = zip(*file[:4], strict=True) if "distances" in kept else (
             way for k in range(len(LAWS) + 1) for way in of_law(own[(road == 1) & (law == k)])
         )  # fmt: skip
-        of_water, of_snow = slice(3 * KINDS, 3 * KINDS + KINDS_ONE), slice(3 * KINDS + KINDS_ONE, None)
+        # wet kinds by the traction are learnt by themselves
+        both = file.road.size - 2 * KINDS_ONE if "roads" in kept else 3 * KINDS
+        of_water, of_snow = slice(-2 * KINDS_ONE, -KINDS_ONE), slice(-KINDS_ONE, None)
         m, S, share = (np.concatenate(k) for k in zip(
-            *([[t[: 3 * KINDS] for t in file[6:9]]] if "roads" in kept else
+            *([[t[:both] for t in file[6:9]]] if "roads" in kept else
               [kinds_of(x[some, :_N], x[some, _N : _N + used], rng) for some, used in roads]),
             [t[of_water] for t in file[6:9]] if "distances" in kept else
             kinds_of(x[water, :_N], x[water, _N : _N + 1], rng, KINDS_ONE),
@@ -274,8 +320,8 @@ def learn(found, kept=()):
             rear_of(*np.split(x[some & known], (_N, _N + _Z), axis=1), (m[k], S[k], share[k]))
             for some, k in ((water, of_water), (snow, of_snow))
         ), strict=True)  # fmt: skip
-        of = np.repeat([0.0, 1.0, 2.0, 1.0, 3.0], [*[KINDS] * 3, *[KINDS_ONE] * 2])
-        is_one = np.arange(of.size) >= 3 * KINDS
+        of = np.repeat([0.0, 1.0, 2.0, 1.0, 3.0], [KINDS, both - 2 * KINDS, KINDS, *[KINDS_ONE] * 2])
+        is_one = np.arange(of.size) >= both
         for some, whole in (((of == 1.0) & ~is_one, 1.0 - SHARE_ONE), ((of == 1.0) & is_one, SHARE_ONE)):
             share[some] *= whole / share[some].sum()
         by_law = (np.array(each) for each in zip(*distances, strict=True))
@@ -283,13 +329,33 @@ def learn(found, kept=()):
     return tables, len(found)
 
 
+def write(tables, of_what):
+    """Write the file of emissions."""
+    target = Path(emissions.__file__).with_name("emissions.toml")
+    lines = text_of(tables, f"Made by `python -m tests.margin.learn` from {of_what}.")
+    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, default in (("passes", 5400), ("one-side", 4500), ("drives", 24), ("others", 600), ("first", 100_000)):
+    for name, default in (
+        ("passes", 5400),
+        ("one-side", 4500),
+        ("drives", 24),
+        ("others", 600),
+        ("steady", 0),
+        ("first", 100_000),
+    ):
         parser.add_argument(f"--{name}", type=int, default=default)
     parser.add_argument("--keep", type=Path, default=Path("windows.npz"), help="file of windows, taken where it exists")
     parser.add_argument("--same-roads", action="store_true", help="learn distances, and keep the file's kinds of road")
     a = parser.parse_args()
+    if a.steady:
+        rows = np.array([*steady_passes(a.first, a.steady)])
+        tables = {d: emissions.emissions_of(d) for d in DRIVETRAINS}
+        tables = {d: with_steady(tables[d], rows[rows[:, 0] == k]) for k, d in enumerate(DRIVETRAINS)}
+        write(tables, f"{len(rows):,} windows, all but wet kinds by the traction of before")
+        return
     kept = ("roads",) * (a.same_roads or not a.passes) + ("distances",) * (not a.passes)
     if not a.keep.exists():
         roads = () if kept else (*of_drives(a.first, a.drives), *of_others(a.first, a.others))
@@ -297,9 +363,7 @@ def main():
         np.savez(a.keep, x=np.array((*wet, *roads, *of_others(a.first, a.others, one_side=True))))
     tables, n = learn(np.load(a.keep)["x"], kept)
     before = f", {' and '.join(kept)} of before" if kept else ""
-    note = f"Made by `python -m tests.margin.learn` from {n:,} windows{before}."
-    target = Path(emissions.__file__).with_name("emissions.toml")
-    target.write_text("\n".join(text_of(tables, note)) + "\n", encoding="utf-8")
+    write(tables, f"{n:,} windows{before}")
 
 
 if __name__ == "__main__":

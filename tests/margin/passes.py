@@ -27,6 +27,7 @@ V_FULL = (60.0 * KMH, 150.0 * KMH)
 V_LEAST = 50.0 * KMH
 AGAIN = (15.0 * KMH, 45.0 * KMH)  # [m/s] below full aquaplaning, of further runs of a campaign
 DT = 0.01
+STAY = 4.0  # [s] in the water
 # exponents of lost contact: as sources have it, early with a rest that stays for long, and late within few km/h
 LAWS = ((1.5, 6.0), (0.1, 1.5), (6.0, 20.0))
 STOP_L = 0.13  # [-] contact share at which a free wheel stops
@@ -98,12 +99,12 @@ def any_tyre(tyre: Tyre, rng: np.random.Generator, exponents: tuple[float, float
 
 def own_pass(
     seed: int, drivetrain: str | None = None, *, distance: tuple[float, float] = DISTANCE, law: int | None = None,
-    run: int = 0, one_side: bool = False,
+    run: int = 0, one_side: bool = False, stay: float = STAY,
 ) -> Pass:  # fmt: skip
     """A pass of the project's simulator at about one speed: tyre, pressure, water and car are drawn.
 
     `law`: one of `LAWS`, with the others drawn by `any_tyre`, to learn from. `run`: another pass of the same tyre,
-    water and car. `one_side`: no water on the left.
+    water and car. `one_side`: no water on the left. `stay`: time in the water. [s]
     """
     broad = law is not None
     rng = np.random.default_rng([seed, 79 if broad else 77])
@@ -126,7 +127,7 @@ def own_pass(
         rng = np.random.default_rng([seed, run, 77])
         v = full - rng.uniform(*AGAIN)
     k = Drawing(rng, pool, car, tyre, p, int(rng.integers(2**31)))
-    approach, stay = k.between(9.0, 16.0), 4.0
+    approach = k.between(9.0, 16.0)
     a = k.between(-0.4, 0.4) if k.between(0.0, 1.0) < 0.3 else 0.0
     start = (v - a * 4.0) * (approach - 4.0) + 4.0 * (v - 2.0 * a)
     calm = float(0.03 ** k.rng.uniform()) if broad else 1.0

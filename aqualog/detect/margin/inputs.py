@@ -19,12 +19,14 @@ PAIRS = ((0, 2), (1, 3), (2, 3))  # of `WHEELS`: front and rear of each side, bo
 V_MIN = 5.0  # [m/s] slower, wheel speeds are too coarse
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering costs more than the balance knows
 TAU_A = 0.5  # [s] of the acceleration that these limits are for, about the window's length
-A_MOST, A_LEAST = 0.5, -1.5  # [m/s^2] beyond, an unknown trailer shows more than water; braking
-U_MAX = 0.25  # [-] of the traction: beyond, the slip of a dry tyre is no longer a line
+A_MOST, A_LEAST = 1.5, -1.5  # [m/s^2] beyond, no slip counts; braking
+HURRY = 0.5  # [m/s^2] beyond, an unknown trailer, or a torque that is off by a tenth, shows more than water
+U_MOST, FORCED = 0.6, 0.35  # [-] of the traction: beyond, no slip counts; the slip of a dry tyre is known roughly
 LOAD_LEAST = 100.0  # [N] of a wheel that lifts off in a curve
 JUMP = 0.02  # [-] of the traction within a tenth of a second: a gear shift, which torque signals report late
 HOLD = 0.3  # [s] after it
 TAU_JUMP = 0.1  # [s]
+SHIFT = 1.0  # [s] a gear shift is over by then: jumps that go on are a traction control at work, as on water
 STANDS = 0.25  # [s] a wheel speed that does not change by a bit for longer has stopped coming
 HELD = 0.5  # [s] the same of a torque, while that of the axle's other wheel comes
 
@@ -37,7 +39,7 @@ class Reader:
         self._dt = dt
         self._slow = {"f": UNSET, "r": UNSET}
         self._a = UNSET
-        self._left = 0
+        self._left = self._jumping = 0
         self._unchanged = dict.fromkeys((f"{stem}_{w}" for stem in ("omega", "torque") for w in WHEELS), (UNSET, 0))
 
     def push(self, scene: Scene) -> Inputs:
@@ -52,19 +54,21 @@ class Reader:
         held = [self._stands(scene, f"torque_{w}", HELD) for w in WHEELS]
         jump |= (held[0] ^ held[1]) | (held[2] ^ held[3])
         with np.errstate(invalid="ignore"):
-            rolls = (v > V_MIN) & ~scene.is_braking & ~jump
+            rolls = (v > V_MIN) & ~scene.is_braking
             trusted = rolls & (a < A_MOST) & (a > A_LEAST) & ~(np.abs(f["a_y_slow"]) > A_Y_MAX)
-        R = np.where(trusted, f["delta_a_x"], np.nan)
+            known = ~jump & ~(a > HURRY)
+            rough = ~known | (np.max(np.abs(u), axis=0) > FORCED)
+        R = np.where(trusted & known, f["delta_a_x"], np.nan)
         turning, pairs = [self._turning(scene, w) for w in WHEELS], []
         for one, other in PAIRS:
             front, rear = turning[one], turning[other]
             with np.errstate(invalid="ignore", divide="ignore"):
                 slip = none if front is None or rear is None else (front - rear) / v
-                small = np.maximum(np.abs(u[one]), np.abs(u[other])) < U_MAX
+                small = np.maximum(np.abs(u[one]), np.abs(u[other])) < U_MOST
             pairs.append(np.where(trusted & small, slip, np.nan))
         # of the torques, not the accelerometer: that is in the resistance too, and its noise would make a slope of them
         torques = f["delta_a_x"] + scene.columns["a_x"]
-        return Inputs._make((v, torques, R, *pairs, *u, scene.columns["a_x"]))
+        return Inputs._make((v, torques, R, *pairs, *u, scene.columns["a_x"], rough.astype(float)))
 
     def _turning(self, scene: Scene, wheel: str) -> FloatArray | None:
         """Speed of a wheel on the centre line, NaN where its signal stands still. [m/s]"""
@@ -89,7 +93,8 @@ class Reader:
             with np.errstate(invalid="ignore"):
                 away |= np.abs(0.5 * x - slow) > JUMP
         away, self._left = hold_on(away, self._left, seconds=HOLD, dt=self._dt)
-        return away
+        goes_on, self._jumping = lasting(away, self._jumping, least=max(1, round(SHIFT / self._dt)))
+        return away & ~goes_on
 
     def _traction(self, scene: Scene) -> list[FloatArray]:
         """Torque over lever and load of each wheel; in a curve the outer ones carry more. [-]"""

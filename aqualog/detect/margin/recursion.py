@@ -39,7 +39,8 @@ _SURE = 1.645  # standard deviations of a quantile of 95 %
 _STILL = 0.25  # variance of what wheels shake that shake as on dry road, of 0.6 s in log variance
 _NEVER, _FAINT = -40.0, 1e-12  # of an evidence: below the best, and itself
 _UNKNOWN = 1e4  # variance of a feature that is missing
-_V, _A, _R, _D, _U_F, _U_R, _B, _VAR, _VAR_B, _S_F, _S_R = 0, 1, 2, 3, 6, 8, 10, 11, 14, 15, 17  # columns of a step
+_V, _A, _R, _D, _U_F, _U_R, _B, _VAR, _VAR_B, _S_F, _S_R = 0, 1, 2, 3, 6, 8, 10, 12, 15, 16, 18  # columns of a step
+_ROUGH = 11
 _SLIP, _SHAKE = (1, 2, 5), (3, 4, 6)  # places among the features of two sides and the rear axle
 _NI = len(Inputs._fields)
 _LEAST, _LEAST_B = 1e-10, 1e-5  # of a slip's variance, and of the accelerometer's [(m/s^2)^2]
@@ -403,6 +404,9 @@ def _step(p, t, m, row, s):  # type: ignore[no-untyped-def]
     for i in range(2):
         row[_S_F + i] = _slip(row[_U_F + i], p.slope_f, p.rolling, p.friction)
         row[_S_R + i] = _slip(row[_U_R + i], p.slope_r, p.rolling, p.friction)
+    # what slips roughly as on dry road teaches nothing of it; in water that is known the slips are far larger
+    if row[_ROUGH] > 0.5 and not _is(t, m, 1) > p.probable:
+        row[_D : _D + 3] = math.nan
     at = int(m.samples[1]) % ROWS
     m.samples[1] += 1.0
     v = row[_V]

@@ -30,7 +30,7 @@ OUTPUTS = ("p_water", "p_near", "low", "q25", "median", "q75", "high", "contact"
 """Rows of what a scan returns: probabilities [-], quantiles of the distance [m/s], contact share [-], whether
 drag, shake or the slip of both sides is more than that of the dry road (1 or 0), speed [m/s]."""
 ROWS = 6  # steps of the window
-COLUMNS = 19  # means of a step: inputs, variances of slips and specific force, the slips of dry wheels by the traction
+COLUMNS = 20  # means of a step: inputs, variances of slips and specific force, the slips of dry wheels by the traction
 
 
 class FilterParams(NamedTuple):
@@ -75,7 +75,8 @@ class FilterParams(NamedTuple):
     shakes: float = 2.0  # [-] log variance that it adds where it takes less
     both: float = 1.0  # [-] slip of the side that deviates less, where it does neither
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
-    heard: float = 1e-3  # [-] probability of water from which its distances are compared
+    probable: float = 0.5  # [-] probability of water from which slips count that are known roughly
+    heard: float = 2e-3  # [-] probability of water from which its distances are compared
     weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay
     law_R: float = 0.5  # [-] by which the laws of resistance may differ beyond what was drawn
     law_M: float = 1.4  # [-] the same of the log variances
@@ -88,7 +89,8 @@ class FilterParams(NamedTuple):
 
 class Inputs(NamedTuple):
     """Arrays (n,): speed [m/s]; acceleration that the torques make on a level dry road and resistance [m/s²]; of sides
-    slip front less rear; of the rear axle left less right; traction [-]; specific force along the car [m/s²].
+    slip front less rear; of the rear axle left less right; traction [-]; specific force along the car [m/s²]; 1 where the
+    car speeds up, the torque jumps or a wheel transmits so much that the dry road's slip is known roughly, else 0.
 
     NaN where a value is unknown or not to be trusted.
     """
@@ -104,6 +106,7 @@ class Inputs(NamedTuple):
     u_rl: FloatArray
     u_rr: FloatArray
     a_x: FloatArray
+    rough: FloatArray
 
 
 class Emissions(NamedTuple):
