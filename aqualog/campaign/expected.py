@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aqualog.campaign.definition import loads_of
 from aqualog.campaign.results import RunInfo
@@ -110,11 +111,23 @@ def _shares(L: FloatArray, mu_max: float, mu_range: tuple[float, float]) -> Floa
     found = np.full(L.size, np.nan)
     if not low < high:
         return found
-    for i, row in enumerate(_carried() if L is _L else _carried_by(L)):
-        if max(-low, high) <= mu_max * row[-1]:
-            at_low, at_high = (math.copysign(float(np.interp(abs(x) / mu_max, row, _THETA)), x) for x in mu_range)
-            found[i] = (high - low) / (3.0 * mu_max * (at_high - at_low))
+    rows = _carried() if L is _L else _carried_by(L)
+    k = np.flatnonzero(max(-low, high) <= mu_max * rows[:, -1])
+    at_low, at_high = (math.copysign(1.0, x) * _slips_at(rows, k, abs(x) / mu_max) for x in mu_range)
+    found[k] = (high - low) / (3.0 * mu_max * (at_high - at_low))
     return found
+
+
+def _slips_at(rows: FloatArray, k: NDArray[np.intp], force: float) -> FloatArray:
+    """Of rows k of forces that grow over `_THETA`, the slip at which each is `force`, linear between."""
+    i, after = np.zeros_like(k), np.full_like(k, _THETA.size - 1)
+    while (after - i > 1).any():  # bisection: force[i] <= force < force[after], or the last of all
+        middle = (i + after) // 2
+        is_below = rows[k, middle] <= force
+        i, after = np.where(is_below, middle, i), np.where(is_below, after, middle)
+    step = rows[k, after] - rows[k, i]
+    share = np.divide(force - rows[k, i], step, out=np.ones(k.size), where=step > 0.0)
+    return np.asarray(_THETA[i] + np.minimum(share, 1.0) * (_THETA[after] - _THETA[i]))
 
 
 def _carried_by(L: FloatArray) -> FloatArray:

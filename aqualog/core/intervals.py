@@ -35,7 +35,8 @@ def same_decimals(value: float, ci: Interval) -> tuple[str, str, str]:
 @lru_cache(maxsize=256)
 def student_quantile(probability: float, dof: float) -> float:
     """Quantile of Student's t [student1908]: 0.5 < probability < 1, real dof >= 1."""
-    u = np.linspace(0.0, math.pi / 2.0, 20_001)  # t = sqrt(dof) tan(u) turns the density into a power of the cosine
+    # t = sqrt(dof) tan(u) turns the density into a power of the cosine, which is nothing beyond twelve deviations
+    u = np.linspace(0.0, min(0.5 * math.pi, 12.0 / math.sqrt(dof)), 4_001)
     density = np.cos(u) ** (dof - 1.0)
     area = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
     return math.sqrt(dof) * math.tan(float(np.interp(2.0 * probability - 1.0, area / area[-1], u)))

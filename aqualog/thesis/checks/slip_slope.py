@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -89,7 +90,9 @@ def _c49(table: Table) -> Check:
     def slope(x: FloatArray, reference: float) -> float:
         return initial_slope(x[:, 1], x[:, 2], friction=friction, dry=reference)
 
-    def errors(rows: Rows) -> tuple[float, float, FloatArray]:
+    @cache  # both errors are of the same draws
+    def errors(draw: bytes) -> tuple[float, float, FloatArray]:
+        rows = np.frombuffer(draw, dtype=np.intp)
         some, where, reference = points[:, rows], bin_of[:, rows], float(np.mean(dry[:, rows]))
         parts = [some[where == k] for k in range(1, edges.size)]
         parts = [x for x in parts if x.shape[0] >= BIN_SAMPLES]
@@ -99,9 +102,9 @@ def _c49(table: Table) -> Check:
         return float(np.sqrt(np.mean(binned**2))), float(np.sqrt(np.mean(whole**2))), binned
 
     n = points.shape[1]
-    value, ci = estimate(lambda r: errors(r)[0], n)
-    without, ci_without = estimate(lambda r: errors(r)[1], n)
-    binned = errors(np.arange(n))[2]
+    value, ci = estimate(lambda r: errors(r.tobytes())[0], n)
+    without, ci_without = estimate(lambda r: errors(r.tobytes())[1], n)
+    binned = errors(np.arange(n).tobytes())[2]
     at = [v for k, v in enumerate(edges[:-1] + 5.0) if np.count_nonzero(bin_of == k + 1) >= BIN_SAMPLES]
     whole, part = value < BIN_ERROR and value < 0.5 * without, value < without
     outcome = (
