@@ -29,6 +29,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.forked import CALL
+
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "aqualog" / "docs"
 REAL_LOGS = ROOT.parent / "shared" / "real_logs"
@@ -106,13 +108,16 @@ class Fault:
         return f"line {self.line}: {self.command}\n{self.why}"
 
 
-def check(page: Path, work: Path, *, long: bool = False) -> tuple[str, list[Fault]]:
-    """Run a page in the empty folder `work`: its text with the true output, and where it differed."""
+def check(page: Path, work: Path, *, long: bool = False, forked: str = "") -> tuple[str, list[Fault]]:
+    """Run a page in the empty folder `work`: its text with the true output, and where it differed.
+
+    `forked`: the socket of `tests.forked` for commands without their imports; default: commands as a reader starts them.
+    """
     text = page.read_text(encoding="utf-8")
     lines = text.splitlines()
     edits: list[tuple[int, int, list[str]]] = []
     faults: list[Fault] = []
-    with Session(work) as session:
+    with Session(work, forked) as session:
         for b in blocks(text):
             if (
                 "not run" in b.marks
@@ -225,29 +230,37 @@ def _both(shown: Sequence[str], now: Sequence[str]) -> str:
     return "\n".join(["the page has", *shown, "now printed", *now])
 
 
+def environment() -> dict[str, str]:
+    """What the examples have in common, wherever they run."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("AQUALOG_", "PYTEST_"))}
+    paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {
+        **kept, "PYTHONPATH": os.pathsep.join(paths), "PYTHONUNBUFFERED": "1", "PYTHONWARNINGS": "ignore", "NO_COLOR": "1",
+        "COLUMNS": "100", "LC_ALL": "C.UTF-8", "TERM": "dumb", "PAGER": "cat", "POLARS_TABLE_WIDTH": "100",
+        "PYDEVD_DISABLE_FILE_VALIDATION": "1",
+    }  # fmt: skip
+
+
 class Session:
     """A folder with the sample logs, a shell whose `aqualog` is this checkout's, and one Python."""
 
-    def __init__(self, work: Path) -> None:
+    def __init__(self, work: Path, forked: str = "") -> None:
         self.work = work.resolve()
         shutil.copytree(ROOT / "sample_logs", work / "sample_logs", ignore=shutil.ignore_patterns("__pycache__"))
         if REAL_LOGS.is_dir():
             (work / "real_logs").symlink_to(REAL_LOGS)
         programs = Path(tempfile.mkdtemp(prefix="examples-"))
         self.programs = programs
+        (programs / "call").write_text(CALL, encoding="utf-8")
         for name, line in {
-            "aqualog": f'exec "{sys.executable}" -m aqualog "$@"',
+            "aqualog": f'exec "{sys.executable}" '
+            + (f'-IS "{programs}/call" "{forked}"' if forked else "-m aqualog")
+            + ' "$@"',
             "python": f'exec "{sys.executable}" "$@"',
         }.items():
             (programs / name).write_text(f"#!/bin/sh\n{line}\n", encoding="utf-8")
             (programs / name).chmod(0o755)
-        kept = {k: v for k, v in os.environ.items() if not k.startswith(("AQUALOG_", "PYTEST_"))}
-        paths = [str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])]
-        self.environment = {
-            **kept, "PATH": f"{programs}:{os.environ['PATH']}", "PYTHONPATH": os.pathsep.join(paths), "PYTHONUNBUFFERED": "1",
-            "PYTHONWARNINGS": "ignore", "NO_COLOR": "1", "COLUMNS": "100", "LC_ALL": "C.UTF-8", "TERM": "dumb", "PAGER": "cat",
-            "POLARS_TABLE_WIDTH": "100", "PYDEVD_DISABLE_FILE_VALIDATION": "1",
-        }  # fmt: skip
+        self.environment = {**environment(), "PATH": f"{programs}:{os.environ['PATH']}"}
         self._python: subprocess.Popen[str] | None = None
 
     def __enter__(self) -> Session:

@@ -3,6 +3,7 @@
 import pytest
 
 from tests.book import examples
+from tests.forked import forking
 
 SLOW = {"guide/big_batches.md", "guide/campaign.md"}
 PAGES = [
@@ -15,10 +16,27 @@ PAGES = [
 ]
 
 
+@pytest.fixture(scope="module")
+def forked(tmp_path_factory):
+    with forking(tmp_path_factory.mktemp("forked") / "socket", examples.environment()) as path:
+        yield path
+
+
 @pytest.mark.parametrize("page", PAGES)
-def test_examples_are_true(page, tmp_path):
-    _, faults = examples.check(page, tmp_path)
+def test_examples_are_true(page, tmp_path, forked):
+    """The README's begin as a reader starts them; those of the book need no imports of their own."""
+    _, faults = examples.check(page, tmp_path, forked="" if page.name == "README.md" else forked)
     assert not faults, "run `python -m tests.book.examples`\n" + "\n\n".join(map(str, faults))
+
+
+def test_a_command_without_imports_ends_as_one_with(tmp_path, forked):
+    said = []
+    for where in ("", forked):
+        with examples.Session(tmp_path / f"work{bool(where)}", where) as session:
+            said.append(session.shell('mkdir a; cd a; aqualog help exit | tail -1; aqualog inspect "no such.csv"'))
+    assert said[0] == said[1]
+    assert said[0][0] > 0
+    assert "no such.csv" in said[0][1][-1]
 
 
 @pytest.mark.nightly
