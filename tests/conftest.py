@@ -30,8 +30,12 @@ LONG = (
     "book/test_links.py", "face/test_validate.py", "cli/test_processes.py", "diagnose/test_day_to_day.py",
     "diagnose/test_full_rate.py", "report/campaign/test_campaign.py", "diagnose/test_grade.py",
     "diagnose/test_agreement.py", "damaged/test_damaged.py", "real/test_diagnose_real.py",
-    "thesis/figures/test_half_car_figures.py",
+    "thesis/figures/test_half_car_figures.py", "trade/test_water_law.py", "validate/test_run.py",
+    "validate/test_sensors.py", "trade/test_watching.py",
 )  # fmt: skip
+
+# folders whose tests take a simulated drive as given; what the simulator does, those of `model` see
+ABOUT_DRIVES = {"calibrate", "diagnose", "face", "real", "report", "thesis", "validate"}
 
 
 def pytest_configure(config):
@@ -83,6 +87,25 @@ def _shared(tmp_path_factory):
 
     if "PYTEST_XDIST_WORKER" in os.environ:
         shared.FOLDER = tmp_path_factory.getbasetemp().parent / "shared"
+
+
+@pytest.fixture(scope="session")
+def _simulated_once():
+    from aqualog.model.follow import led_truth
+    from tests import shared
+
+    return shared.simulated_once(led_truth)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _simulator(request):
+    """Let tests that are not about the simulator have a drive again that others have asked for: a third of them."""
+    if request.path.relative_to(ROOT / "tests").parts[0] not in ABOUT_DRIVES:
+        yield
+        return
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("aqualog.model.follow.led_truth", request.getfixturevalue("_simulated_once"))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -98,21 +98,18 @@ def test_intervals_cover_on_made_windows(n):
 def test_a_rolling_resistance_that_rises_with_speed_is_in_the_intervals(monkeypatch):
     """It is taken for drag: the more drives, the surer an interval without it leaves out the truth."""
 
-    def inside():
-        held = {"drag_area": 0, "rolling_resistance": 0}
-        for seed in range(40):
-            samples = drives(seed, 6, rises=1.0)
-            best = fit_balance(samples, fixed)
-            spread = spread_of(lambda s: estimates(s, fixed), samples, drag=best.drag, air_density=RHO)
+    fixed, truth = {"torque_gain": 1.0}, {"drag_area": AREA, "rolling_resistance": R_W}
+    held = {rise: dict.fromkeys(truth, 0) for rise in (derive.RISE_SD, 0.0)}
+    for seed in range(40):
+        samples = drives(seed, 6, rises=1.0)
+        best = fit_balance(samples, fixed)
+        spread = spread_of(lambda s: estimates(s, fixed), samples, drag=best.drag, air_density=RHO)
+        for rise, counts in held.items():
+            monkeypatch.setattr(derive, "RISE_SD", rise)
             for p in balance_parameters(derived(best, fixed), spread, fixed, Vehicle(air_density=RHO), samples):
-                if p.name in held:
-                    held[p.name] += p.ci95[0] <= {"drag_area": AREA, "rolling_resistance": R_W}[p.name] <= p.ci95[1]
-        return held
-
-    fixed = {"torque_gain": 1.0}
-    with_it = inside()
-    monkeypatch.setattr(derive, "RISE_SD", 0.0)
-    without = inside()
+                if p.name in truth:
+                    counts[p.name] += p.ci95[0] <= truth[p.name] <= p.ci95[1]
+    with_it, without = held.values()
     assert min(with_it.values()) >= 34
     assert max(without.values()) <= 30
 
