@@ -35,7 +35,7 @@ LONG = (
 )  # fmt: skip
 
 # folders whose tests take a simulated drive as given; what the simulator does, those of `model` see
-ABOUT_DRIVES = {"calibrate", "diagnose", "face", "real", "report", "thesis", "validate"}
+ABOUT_DRIVES = {"blind", "calibrate", "cli", "diagnose", "face", "real", "report", "thesis", "validate"}
 
 
 def pytest_configure(config):

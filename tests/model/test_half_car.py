@@ -40,16 +40,19 @@ def test_constant_speed_by_hand():
 @pytest.mark.parametrize("nu", [0.0, 0.4, 1.0])
 def test_acceleration_loads_and_slip_of_steady_driving(car, a_x, nu):
     r = simulate_half_car(car, HalfCarRun(4.0, v0=20.0, a_x=a_x, nu=nu))
-    assert r.a_x == pytest.approx(a_x, abs=4e-3)
     wheelbase = car.l_f + car.l_r
     transfer = car.mass * car.h_cg / wheelbase * r.a_x
-    assert r.F_z_f == pytest.approx(car.mass * G * car.l_r / wheelbase - transfer)
-    assert r.F_z_r == pytest.approx(car.mass * G * car.l_f / wheelbase + transfer)
     F_sum = car.mass * a_x + 0.5 * 0.66 * 1.204 * r.v_x**2
-    assert r.F_x_f == pytest.approx((1 - nu) * F_sum, abs=6.0)
-    assert r.F_x_r == pytest.approx(nu * F_sum, abs=6.0)
-    assert r.s_f == pytest.approx(brush_slip((1 - nu) * F_sum / r.F_z_f, mu=car.mu, slope=car.slope_f), abs=6e-5)
-    assert r.s_r == pytest.approx(brush_slip(nu * F_sum / r.F_z_r, mu=car.mu, slope=car.slope_r), abs=6e-5)
+    s_f = brush_slip((1 - nu) * F_sum / r.F_z_f, mu=car.mu, slope=car.slope_f)
+    s_r = brush_slip(nu * F_sum / r.F_z_r, mu=car.mu, slope=car.slope_r)
+    near = np.testing.assert_allclose  # of arrays a hundred times as fast as `approx`
+    near(r.a_x, a_x, rtol=0.0, atol=4e-3)
+    near(r.F_z_f, car.mass * G * car.l_r / wheelbase - transfer, rtol=1e-6)
+    near(r.F_z_r, car.mass * G * car.l_f / wheelbase + transfer, rtol=1e-6)
+    near(r.F_x_f, (1 - nu) * F_sum, rtol=0.0, atol=6.0)
+    near(r.F_x_r, nu * F_sum, rtol=0.0, atol=6.0)
+    near(r.s_f, s_f, rtol=0.0, atol=6e-5)
+    near(r.s_r, s_r, rtol=0.0, atol=6e-5)
 
 
 @pytest.mark.parametrize(("nu", "free", "driven"), [(0.0, "r", "f"), (1.0, "f", "r")])

@@ -220,3 +220,4 @@ def test_views_and_other_types_are_taken():
     wide = np.column_stack([y, mu_i, rho_mu_j])
     e, _ = run((wide[:, 0], wide[:, 1], wide[:, 2], is_active.astype(float)))
     assert_same(run((y, mu_i, rho_mu_j, is_active))[0], e)
+    assert len(estimator._scan.nopython_signatures) == 1  # each would be compiled for seconds

@@ -275,5 +275,6 @@ def scan(
     """
     out = np.empty((11, s_delta.size))
     sums = cusum.CusumParams(p.zeta, p.h, math.inf, p.dt)
-    last = _scan(p, sums, state, *plain(s_delta, mu_i, rho_mu_j, is_active), out)
+    inputs = (*(np.asarray(x, dtype=np.float64) for x in (s_delta, mu_i, rho_mu_j)), np.asarray(is_active, dtype=bool))
+    last = _scan(p, sums, state, *plain(*inputs), out)
     return Estimate(*out), last
