@@ -89,8 +89,8 @@ class FilterParams(NamedTuple):
 
 class Inputs(NamedTuple):
     """Arrays (n,): speed [m/s]; acceleration that the torques make on a level dry road and resistance [m/s²]; of sides
-    slip front less rear; of the rear axle left less right; traction [-]; specific force along the car [m/s²]; 1 where the
-    car speeds up, the torque jumps or a wheel transmits so much that the dry road's slip is known roughly, else 0.
+    slip front less rear; of the rear axle left less right; traction [-]; specific force along the car [m/s²]; 1 where
+    the car speeds up, the torque jumps or a wheel transmits so much that the dry road's slip is known roughly, else 0.
 
     NaN where a value is unknown or not to be trusted.
     """
