@@ -1,11 +1,13 @@
 """Where a wheel floats or may float nothing is judged; the rest of the water is."""
 
 from dataclasses import replace
+from unittest.mock import patch
 
 import numpy as np
 
 from aqualog.diagnose.channels import centre_line_speeds
 from aqualog.diagnose.drive import BEYOND_GRIP, prepare
+from aqualog.diagnose.inputs import brakes_unlogged
 from aqualog.model.scenario import Lane
 from aqualog.model.sensors import IDEAL
 from tests.diagnose.test_drive import CAR, changed, signals, term
@@ -39,12 +41,16 @@ def test_a_wheel_that_only_the_simulation_lets_float_is_left_out_too():
 
 
 def test_water_is_no_brake_that_is_not_logged():
-    deep = tuple(replace(x, depth_left=2.5e-3, depth_right=2.5e-3) for x in LANES)
-    log = wet(term("water_drag", gain=5.0), lanes=deep)
-    log = changed(log, log.frame.drop("brake_pressure", strict=False))
-    assert not any("brakes" in n for n in prepare(log, CAR, "a").notes)
-    dry = changed(log, log.frame.select(s for s in log.frame.columns if "water" not in s))
-    assert any("brakes" in n for n in prepare(dry, CAR, "a").notes)
+    """It slows a car that rolls as a brake does."""
+    log = changed(wet(), wet().frame.drop("brake_pressure", strict=False))
+    on_water = log.array("water_depth_left") > 0.0
+    v = np.where(on_water, 40.0 - 2.0 * (np.arange(on_water.size) * log.dt % 5.0), 30.0)
+    still = np.zeros((4, v.size))
+    assert brakes_unlogged(still, v, np.zeros(v.size, dtype=bool), CAR, log.dt)
+    with patch("aqualog.diagnose.inputs.brakes_unlogged", side_effect=lambda _t, _v, wet, *_: seen.append(wet)):
+        seen: list[np.ndarray] = []
+        prepare(log, CAR, "a")
+    assert not brakes_unlogged(still, v, seen[0], CAR, log.dt)
 
 
 def test_water_that_is_hardly_judged_is_said():

@@ -64,8 +64,9 @@ _PROVENANCE = """
 `wheels.r_e_f = { source = "calibrated", sd = 0.0004 }`, in the key's unit. A key that is set without a line here counts
 as `data_sheet`, with a value in `[spread]` as `calibrated`. A key that is not set is a `guess`, and no other source may
 be given for it. `aqualog calibrate` writes what it estimated, and measured for what `--fix` gave. `aqualog diagnose`
-names nothing that these deviations explain. Without this table every value that is set counts as exact there, and
-its page says so.
+names nothing that these deviations explain. Mass and torque gain are one ratio: where drives have calibrated the mass,
+or the gain with a measured mass, neither deviates beyond that ratio. Without this table every value that is set counts
+as exact there, and its page says so.
 """
 _KNOWN = """
 `[known]` lists faults of the car that are known: an [effect](effects.md), with `@` and its place, values of its
