@@ -10,7 +10,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from aqualog.align.freezes import Freeze, Stretch, freeze_note, joined_note, stand_watch_of, watch_of, within
+from aqualog.align.freezes import (
+    SPEEDS,
+    Freeze,
+    StartWatch,
+    Stretch,
+    freeze_note,
+    joined_note,
+    stand_watch_of,
+    unread_note,
+    watch_of,
+    within,
+)
 from aqualog.align.glitches import KNOWN_NS, Glitches, glitches_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.timebase import MEDIAN_OF
@@ -132,10 +143,12 @@ class Taken(NamedTuple):
 
 
 class Unmeasured(NamedTuple):
-    """Where no sensor made the samples of a signal: it repeats itself, or a logger joined a gap by a line."""
+    """Where no sensor made the samples of a signal: it repeats itself, a logger joined a gap by a line, or no message
+    had come yet."""
 
     frozen: tuple[Freeze, ...] = ()
     joined: tuple[Stretch, ...] = ()
+    unread: tuple[Freeze, ...] = ()
 
 
 class Cleaner:
@@ -169,9 +182,11 @@ class Cleaner:
         self._lines = line_watch_of(name) if unmeasured is None else None
         # when the car stands by this signal, if it is a speed; complete once all samples of the first pass are through
         self.stands = stand_watch_of(name, r_e) if unmeasured is None else None
+        is_watched = unmeasured is None and self._symbol.kind == "continuous"
+        self.start = StartWatch((r_e or 1.0) if name in SPEEDS else None) if is_watched else None
         # counts, and where something was first found
         self._in_order = self._bad = self._code = self._out = self._glitches = self._through = 0
-        self._frozen = self._joined = 0
+        self._frozen = self._joined = self._unread = 0
         self._first_glitch_ns: int | None = None
         self._first_out: tuple[int, float] | None = None
         # the time in which a jump may turn back
@@ -205,7 +220,12 @@ class Cleaner:
             self._lines.push(t, x)
         if self.stands is not None:
             self.stands.push(t, x)
+        if self.start is not None:
+            self.start.push(t, x)
         if any(self._unmeasured):
+            silent = within(t, self._unmeasured.unread, has_end=True)
+            self._unread += int(silent.sum())
+            t, x = _where(~silent, t, x)
             repeats = within(t, self._unmeasured.frozen, has_end=True)
             joined = within(t, self._unmeasured.joined, has_end=False) & ~repeats  # its ends were measured
             self._frozen += int(repeats.sum())
@@ -278,7 +298,9 @@ class Cleaner:
                 f"{self._symbol.high:g} {self._symbol.unit} (first: {value:.6g} at {float(at - begin) * 1e-9:.2f} s) "
                 f"are left out{': all of them, its unit or its sign is wrong' if self._out == self._in_order else ''}"
             )
-        if self._unmeasured.frozen:
+        if self._unread:
+            notes.append(unread_note(self.where, self._unread))
+        if self._frozen:
             notes.append(freeze_note(self.where, self._frozen, begin, self._unmeasured.frozen))
         if self._unmeasured.joined:
             notes.append(joined_note(self.where, self._joined, begin, self._unmeasured.joined))
@@ -292,7 +314,7 @@ class Cleaner:
             not_finite=self._bad,
             out_of_range=self._out + self._glitches,
             invalid_code=self._code,
-            frozen=self._frozen,
+            frozen=self._frozen + self._unread,
             joined=self._joined,
             faults=taken.faults,
             mapped=mapped_as(self._entry),

@@ -5,7 +5,8 @@ moving wheel is 0.9 s, of a torque 18 s. The check judges a signal only if it sh
 reports a coarse signal at constant speed, or one that was calculated. A standing wheel, a torque of zero, and any
 torque, acceleration or yaw rate of a standing car may keep their value for any time. A wheel whose first value lasts
 until a step that no wheel can make was not measured before that step: control units send zeros or a code before their
-sensors are awake. A speed that keeps one value through the whole log, while another speed shows a drive, was never
+sensors are awake. Zeros of the first half second that end in one step, as `StartWatch` says, are no message either: a
+locked wheel stands longer, and turns up over several samples. A speed that keeps one value through the whole log, while another speed shows a drive, was never
 measured; nor was such an `a_x` beside a speed with noise. In any other channel only one stop that is unlike the rest of
 the signal is reported.
 """
@@ -21,8 +22,9 @@ from aqualog.align.glitches import is_leap
 from aqualog.core.records import BoolArray, FloatArray, TimeArray
 
 __all__ = [
-    "SPEEDS", "Freeze", "FreezeWatch", "StandWatch", "Stop", "Stretch", "dead_speeds", "freeze_note", "joined_note",
-    "limits_of", "longest_stop", "stand_watch_of", "standing_by", "watch_of", "while_moving", "within",
+    "SPEEDS", "Freeze", "FreezeWatch", "StandWatch", "StartWatch", "Stop", "Stretch", "dead_speeds", "freeze_note",
+    "joined_note", "limits_of", "longest_stop", "stand_watch_of", "standing_by", "unread", "unread_note", "watch_of",
+    "while_moving", "within",
 ]  # fmt: skip
 
 Freeze = tuple[int, int]
@@ -45,6 +47,9 @@ _FINEST = 1.5  # times the finest step of a signal is still that step
 _NOISE = 0.05  # least share of steps against the step before: measured speeds have 0.11 and more
 _STILL = 3  # samples that repeat the first one, at least, of a sensor that is not awake yet
 _GAP_NS = 1_000_000_000
+_UNREAD_NS = 500_000_000  # longest time before the first message of a signal; a wheel locks for longer
+_BEGIN_NS = 6_000_000_000  # by which a first message is judged: some samples of a GNSS
+_AT_ONCE = 5.0  # times the largest step behind it: so far a signal leaps with its first message
 # of channels of any kind
 _STOP_S = 10.0
 _TIMES_USUAL = 20.0
@@ -245,6 +250,56 @@ def freeze_note(where: str, count: int, first_ns: int, freezes: tuple[Freeze, ..
         f"{where}: {count} samples (first at {after * 1e-9:.2f} s) only repeat the one before, for up to "
         f"{longest * 1e-9:.1f} s; the signal is frozen there, left out"
     )
+
+
+# --- zeros before the first message
+
+
+class StartWatch:
+    """Keep the begin of one signal, in any pieces. `scale` makes a speed m/s; None for other signals."""
+
+    def __init__(self, scale: float | None) -> None:
+        self.scale = scale
+        self._t: TimeArray = np.zeros(0, dtype=np.int64)
+        self._x: FloatArray = np.zeros(0)
+
+    def push(self, t_ns: TimeArray, x: FloatArray) -> None:
+        """Take samples (n,) at strictly increasing stamps, finite."""
+        first = self._t[:1] if self._t.size else t_ns[:1]
+        if t_ns.size and t_ns[0] <= first[0] + _BEGIN_NS:
+            end = int(np.searchsorted(t_ns, first[0] + _BEGIN_NS, side="right"))
+            self._t, self._x = np.concatenate([self._t, t_ns[:end]]), np.concatenate([self._x, x[:end]])
+
+    def finish(self) -> Freeze | None:
+        """Return the zeros before the first message; None without any.
+
+        They end in one step, far larger than those that follow. A speed leaps by more than a car that starts can. A
+        signal that is held on a finer grid has the time in which it is held for that.
+        """
+        n = int(np.argmax(self._x != 0.0)) if self._x.size else 0
+        t, x = self._t[n:], self._x[n:]
+        changes = np.flatnonzero(np.diff(x))
+        if not n or self._t[n - 1] - self._t[0] > _UNREAD_NS or changes.size < 3:
+            return None
+        behind = max(int(np.searchsorted(t, t[0] + _UNREAD_NS)), int(changes[2]) + 2)
+        if abs(x[0]) <= _AT_ONCE * np.abs(np.diff(x[:behind])).max():
+            return None
+        step_ns = max(int(t[0] - self._t[n - 1]), int(np.diff(t[changes]).min()))
+        if self.scale is not None and abs(x[0]) * self.scale <= _STOPPING * step_ns * 1e-9 + _SLACK:
+            return None
+        return int(self._t[0]) - 1, int(self._t[n - 1])
+
+
+def unread(watches: Mapping[str, StartWatch]) -> dict[str, Freeze]:
+    """Return the zeros before the first message by signal. Only a speed shows by itself that they are no values."""
+    found = {name: zeros for name, w in watches.items() if (zeros := w.finish()) is not None}
+    return found if any(watches[name].scale is not None for name in found) else {}
+
+
+def unread_note(where: str, count: int) -> str:
+    """Describe what was left out because no message had come yet."""
+    first = "the first sample reads" if count == 1 else f"the first {count} samples read"
+    return f"{where}: {first} 0 while the car rolls: no message had come yet, left out"
 
 
 # --- when the car stands: a constant value there is no evidence of a dead sensor

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from aqualog.align.clean import Clean, Cleaner, Samples, Taken, Unmeasured, corrected, span_of
-from aqualog.align.freezes import SPEEDS, dead_speeds, limits_of, standing_by, while_moving
+from aqualog.align.freezes import SPEEDS, dead_speeds, limits_of, standing_by, unread, while_moving
 from aqualog.align.grid import (
     MAX_ROWS,
     Grid,
@@ -267,6 +267,8 @@ def plan_drive(
     for name, own in unmeasured.items():
         if limits := limits_of(name):
             unmeasured[name] = own._replace(frozen=while_moving(own.frozen, standing, limits[0]))
+    for name, zeros in unread({name: c.start for name, c in cleaners.items() if c.start is not None}).items():
+        unmeasured[name] = unmeasured[name]._replace(unread=(zeros,))
     in_part = {name: found[name] for name, own in unmeasured.items() if any(own)}
     if in_part:  # sample times and counts are those without what nobody measured
         again = cleaners_of(in_part, signal_map, vehicle, unmeasured)

@@ -199,6 +199,51 @@ def test_a_wheel_that_starts_by_itself_was_awake(pieces):
     assert found(t, x, "omega_fl", pieces) == ()
 
 
+def rolling(speed, zeros, dt=0.01, seconds=20.0, hold=1, first_rise=1):
+    """Four wheels and `v_x` of a car at even speed, `zeros` samples of which come before the first message."""
+    rng = np.random.default_rng(3)
+    t = np.arange(round(seconds / dt)) * dt
+    signals = []
+    for name in ("omega_fl", "omega_fr", "omega_rl", "omega_rr", "v_x", "a_y", "torque_fl"):
+        x = {"v_x": speed, "a_y": 0.01, "torque_fl": 150.0}.get(name, speed / 0.3) + 0.02 * rng.standard_normal(t.size)
+        x = x[np.arange(t.size) // hold * hold]
+        n = zeros.get(name, 0)
+        x[:n] = 0.0
+        x[n : n + first_rise] *= np.arange(1, first_rise + 1) / first_rise
+        unit = {"v_x": "m/s", "a_y": "m/s^2", "torque_fl": "N*m"}.get(name, "rad/s")
+        signals.append(channel(name, t, x, unit))
+    return signals
+
+
+def silent_at_first(signals):
+    """Samples by signal that count as missing because no message had come, by the notes of the whole and the pieces."""
+    whole = same(signals, size=300)
+    said = [n for n in whole.quality.notes if "no message had come yet" in n]
+    frozen = {n: o.frozen for n, o in whole.origins.items() if o.frozen}
+    assert len(said) == len(frozen)
+    for name, count in frozen.items():
+        first = "first sample reads 0" if count == 1 else f"first {count} samples read 0"
+        assert any(f"{name}: the {first} while the car rolls" in n for n in said)
+        assert whole.frame[name].null_count() >= count
+    return frozen
+
+
+@pytest.mark.parametrize("speed", [3.0, 8.0, 30.0])
+@pytest.mark.parametrize("zeros", [{"omega_fl": 1}, {f"omega_{w}": 2 for w in WHEELS}, {"v_x": 20, "torque_fl": 20}])
+def test_zeros_before_the_first_message_are_missing(speed, zeros):
+    assert silent_at_first(rolling(speed, zeros)) == zeros
+
+
+def test_standing_cars_locked_wheels_and_held_signals_keep_their_zeros():
+    every = {f"omega_{w}": 20 for w in WHEELS} | {"v_x": 20}
+    assert silent_at_first(rolling(8.0, every, first_rise=300)) == {}  # the car starts
+    assert silent_at_first(rolling(1.8, every)) == {}  # a sensor that reads zero below walking speed
+    assert silent_at_first(rolling(3.0, {"omega_fl": 80})) == {}  # locked for 0.8 s
+    assert silent_at_first(rolling(8.0, {"omega_fl": 20}, first_rise=8)) == {}  # locked, and turns up in 80 ms
+    assert silent_at_first(rolling(3.5, {"v_x": 20}, hold=20)) == {}  # 5 Hz on a grid of 100 Hz: 17 m/s² at least
+    assert silent_at_first(rolling(3.0, {"torque_fl": 20})) == {}  # a torque may be zero, and step
+
+
 @pytest.mark.parametrize(("height", "samples"), [(20.0, 9), (-40.0, 5), (30.0, 20)])
 def test_no_detector_alarms_on_spikes_of_the_accelerometer(height, samples, sound):
     channels, car = lane_and_braking()
