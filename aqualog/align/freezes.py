@@ -6,9 +6,9 @@ reports a coarse signal at constant speed, or one that was calculated. A standin
 torque, acceleration or yaw rate of a standing car may keep their value for any time. A wheel whose first value lasts
 until a step that no wheel can make was not measured before that step: control units send zeros or a code before their
 sensors are awake. Zeros of the first half second that end in one step, as `StartWatch` says, are no message either: a
-locked wheel stands longer, and turns up over several samples. A speed that keeps one value through the whole log, while another speed shows a drive, was never
-measured; nor was such an `a_x` beside a speed with noise. In any other channel only one stop that is unlike the rest of
-the signal is reported.
+locked wheel stands longer, and turns up over several samples. A speed that keeps one value through the whole log, while
+another speed shows a drive, was never measured; nor was such an `a_x` beside a speed with noise. In any other channel
+only one stop that is unlike the rest of the signal is reported.
 """
 
 from __future__ import annotations

@@ -204,7 +204,7 @@ def _own_unit(field: TableField) -> str:
 
 
 def from_numbers(
-    values: NDArray[np.float64] | NDArray[np.int64], unit: str, *, cells: pl.Series | None = None
+    values: NDArray[np.float64] | NDArray[np.int64], unit: str, *, cells: pl.Series | None = None, column: str = ""
 ) -> Stamps:
     """Stamps of a numeric column.
 
@@ -216,18 +216,20 @@ def from_numbers(
         Unit of time; empty if it is to be judged by the values.
     cells : Series of text, optional
         What `values` were read from: large stamps are converted from it, digit by digit, where float64 is too coarse.
+    column : str
+        Name of the column.
     """
-    notes: tuple[str, ...] = ()
+    note = ""
     valid: BoolArray = np.isfinite(values)
     if unit:
         factor = round(parse_unit(unit).factor * 1e9)
     else:
         name, reason = judged_unit(values)
-        factor, notes = _NS[name], (no_unit_note(name, reason),)
+        factor, note = _NS[name], no_unit_note(name, reason, column)
     seconds = values.astype(np.float64) * (factor / 1e9)
     valid &= np.abs(seconds) < _LATEST_S
     absolute = bool(valid.any()) and _EPOCH_S[0] < float(np.median(seconds[valid])) < _EPOCH_S[1]
-    return Stamps(_scaled(values, valid, factor, cells), valid, absolute, notes)
+    return Stamps(_scaled(values, valid, factor, cells), valid, absolute, (note,) if note else ())
 
 
 def _scaled(
@@ -258,9 +260,9 @@ def text_to_ns(cells: pl.Series, factor: int) -> pl.Series:
     return frame.select((whole + fraction).alias("t"))["t"]
 
 
-def no_unit_note(name: str, reason: str) -> str:
-    """Return the note on a time whose unit was inferred."""
-    return f"the time has no unit; taken as {name} ({reason})"
+def no_unit_note(unit: str, reason: str, column: str) -> str:
+    """Return the note on a time whose unit was inferred; none where its column is named `t`, which is in seconds."""
+    return "" if (column, unit) == ("t", "s") else f"the time has no unit; taken as {unit} ({reason})"
 
 
 def judged_unit(stamps: NDArray[np.float64] | NDArray[np.int64]) -> tuple[str, str]:

@@ -361,7 +361,8 @@ class CsvReader(TableReader):
             values = numbers(cells[choice.index], column.style).values
             if not unit:
                 unit, reason = judged_unit(np.concatenate([values, self._last_times(text)]))
-                self._note(no_unit_note(unit, reason))
+                if note := no_unit_note(unit, reason, column.name):
+                    self._note(note)
             stamps = from_numbers(values, unit, cells=plain(cells[choice.index], column.style))
             first = first or stamps
             if other:
@@ -423,7 +424,8 @@ class CsvReader(TableReader):
         if column.kind in ("stamp", "clock"):
             with self._located():
                 return from_dates(cells, day, column.kind)
-        return from_numbers(numbers(cells, column.style).values, self._time.unit, cells=plain(cells, column.style))
+        values, text = numbers(cells, column.style).values, plain(cells, column.style)
+        return from_numbers(values, self._time.unit, cells=text, column=column.name)
 
     def _found_rows(self) -> Rows:
         if self._rows is None:

@@ -263,7 +263,8 @@ class ParquetReader(TableReader):
             spans = ((0, _JUDGED), (max(self._rows - 1, 0), 1))
             ends = [self._sound.collect([column.stored], at, n) for at, n in spans]
             self._unit, reason = judged_unit(np.concatenate([_floats(frame[column.stored]) for frame in ends]))
-            self._note(no_unit_note(self._unit, reason))
+            if note := no_unit_note(self._unit, reason, column.name):
+                self._note(note)
         return self._unit
 
     def _channel(self, info: ChannelInfo, column: pl.Series, stamps: Stamps) -> Channel:

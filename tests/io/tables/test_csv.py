@@ -4,6 +4,7 @@ import codecs
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -15,6 +16,7 @@ from aqualog.io.reader import CsvFormat, ReadOptions
 from aqualog.io.tables import csv_text as text_file
 from aqualog.io.tables.columns import split_unit, unique_names
 from aqualog.io.tables.csv import CsvReader
+from aqualog.io.tables.parquet import ParquetReader
 from aqualog.io.write_table import TableColumn, write_csv
 
 
@@ -118,10 +120,7 @@ def test_preamble_of_a_logger(read):
     log = read(text)
     assert log.units == {"v": "km/h", "a": "m/s^2"}
     assert log["a"] == [2, 3, 4]
-    assert (
-        log.faults.notes == ("log.csv: the time has no unit; taken as s (its steps are those of seconds)",)
-        or not log.faults.notes
-    )
+    assert log.faults.notes == ()
 
 
 LONG = [f"{k},5;{k};0,5\n" for k in range(5000)]
@@ -408,6 +407,16 @@ def test_whole_numbers_over_an_absurd_time_are_no_seconds(read, step, by, unit):
     log = read("time,v\n" + "".join(f"{k * step * by},1\n" for k in range(30_000)))
     assert log.t("v")[:2] == [0, step * by * (10**6 if unit == "ms" else 1)]
     assert log.noted("no unit", f"as {unit} ")
+
+
+@pytest.mark.parametrize(("header", "step", "notes"), [("t", 0.01, 0), ("time", 0.01, 1), ("t", 10, 1)])
+def test_t_is_in_seconds_unless_its_steps_are_others(read, tmp_path, header, step, notes):
+    log = read(f"{header},v\n" + "".join(f"{k * step:.6g},1\n" for k in range(30_000)))
+    assert [log.t("v")[1], len(log.faults.notes)] == [10_000_000, notes]
+    pl.DataFrame({header: [k * step for k in range(30_000)], "v": [1.0] * 30_000}).write_parquet(tmp_path / "x.parquet")
+    with ParquetReader(tmp_path / "x.parquet", ReadOptions()) as reader:
+        reader.read(reader.channels())
+        assert sum("no unit" in n for n in reader.faults.notes) == notes
 
 
 def test_a_date_that_can_be_read_two_ways(read):
