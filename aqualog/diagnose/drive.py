@@ -155,13 +155,13 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
             bad |= inputs.smooth(np.gradient(speed, dt), dt, inputs.SPEED_S) < -inputs.roll_out(v, vehicle) - ROLLS_OUT
             notes.append("only driving and rolling out are used: the torque that slows the car is not known")
     elif "brake_pressure" not in filled:
-        unlogged = "" if every_wheel else "the torque is that of one axle"
+        unlogged = "" if every_wheel else "the torque is that of one axle: brakes are not in the log"
         wet = _widened(floats | (_depth(course) > 0.0), BESIDE_S, dt)
         if every_wheel and inputs.brakes_unlogged(torque, v, wet, vehicle, dt):
-            unlogged = "the car slows down more than its torque explains"
+            unlogged = "the car slows down more than its torque explains (brakes, more drag or mass, or a trailer)"
         if unlogged:
             bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.arm("fl")
-            notes.append(f"{unlogged}: brakes are not in the log, driven stretches are used")
+            notes.append(f"{unlogged}, driven stretches are used")
     left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(logged, vehicle, dt) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
     return Drive(

@@ -322,7 +322,7 @@ def _patch(
     there = np.asarray(np.mod(points - start, period) < length, dtype=np.float64)[:, None]
     basis = Basis((name,), own[:, None], np.eye(1), points[:, None], there, np.ones(points.size, dtype=bool))
     unit = "m" if name == "position" else "s"
-    return _Found("patches", f"for {length:.3g} {unit} in every {period:.4g} {unit}", basis, count)
+    return _Found("patches", f"for {length:.2g} {unit} in every {period:.3g} {unit}", basis, count)
 
 
 def _waves(

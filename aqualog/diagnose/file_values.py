@@ -4,17 +4,19 @@ stands in the effect's row (`DayToDay.key` of the whole car, `DriveSearch.axle_k
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from aqualog.core.notation import AXLES
 from aqualog.core.provenance import provenance_of, uncertainty
 from aqualog.core.vehicle import KEYS, Vehicle
 from aqualog.diagnose.hypotheses import Hypothesis
-from aqualog.diagnose.words import listed
+from aqualog.diagnose.words import change_words, listed
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
 
-__all__ = ["as_value", "calibrated_enough", "day_to_day", "deviation", "key_of", "not_calibrated", "with_known"]
+__all__ = [
+    "as_value", "calibrated_enough", "day_to_day", "deviation", "in_words", "key_of", "not_calibrated", "with_known",
+]  # fmt: skip
 
 TORQUE_BY_DRIVE = 0.01  # relative, where a file gives no spread: a bus estimates its torque to 1 to 3 % (K)
 _MATTERS = ("mass", "torque_gain", "wheels.r_e_f", "wheels.r_e_r")
@@ -54,6 +56,16 @@ def own_sd(vehicle: Vehicle, path: str) -> float:
     mass, gain = (provenance_of(vehicle, p).source for p in ("mass", "torque_gain"))
     is_bound = mass == "calibrated" or (gain == "calibrated" and mass == "measured")
     return 0.0 if is_bound and path in ("mass", "torque_gain") else uncertainty(vehicle, path)
+
+
+def in_words(terms: Sequence[Term], asked: Sequence[Hypothesis], vehicle: Vehicle) -> list[str]:
+    """Values that a model has otherwise than the file, each in standard deviations of the file's value."""
+    by_key = {h.key: h for h in asked if not h.drive}
+    keys = [t.effect.name + (f"@{t.where}" if t.where else "") for t in terms]
+    return [
+        change_words(t, {n: deviation(by_key[k], n, vehicle) for n in t.values} if k in by_key else {})
+        for t, k in zip(terms, keys, strict=True)
+    ]
 
 
 def with_known(model: Model, vehicle: Vehicle) -> Model:

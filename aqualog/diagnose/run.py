@@ -21,7 +21,7 @@ from aqualog.diagnose.consequence import consequences
 from aqualog.diagnose.drive import ON_WATER, Drive, led_by, prepare
 from aqualog.diagnose.evidence import SURROGATES, Evidence, around_water, recentred, tolerant
 from aqualog.diagnose.faster import Late, faster, found_late, joined, with_rings
-from aqualog.diagnose.file_values import not_calibrated, with_known
+from aqualog.diagnose.file_values import in_words, not_calibrated, with_known
 from aqualog.diagnose.gain import measured_gain
 from aqualog.diagnose.grade import HILLY, Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
@@ -149,7 +149,7 @@ def _diagnosed(
     sentence = by_drives(found.arena.parts, len(drives)) + verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
         seen=p if p <= options.level else None, untested=untested | seen.untested,
-        moved=bare.terms[len(with_known(given, vehicle).terms) :],
+        moved=in_words(bare.terms[len(with_known(given, vehicle).terms) :], evidence.asked, vehicle),
         unjudged=[n for d in ready for n in d.notes if ON_WATER in n],
     )  # fmt: skip
     return Diagnosis(
@@ -197,7 +197,7 @@ def _simulated(
     moved = recentred(evidence, model)
     if moved != model:
         new = tuple(t for t in moved.terms if t not in model.terms)
-        fitted = listed([*map(term_words, new)])
+        fitted = listed(in_words(new, asked, ready[0].vehicle))
         notes = (f"The vehicle file allows other values. The verdict holds with those that fit best: {fitted}.",)
         model, bare = moved, Model((*bare.terms, *new))
         ready = [led_by(d, model) for d in ready]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from aqualog.core.records import FloatArray
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.shapes import MECHANISMS, Mechanism
@@ -76,6 +77,7 @@ _CHANNELS = {
     "side_slip_r": "slip between the rear wheels",
 }  # fmt: skip
 ALIKE = 0.9  # cosine from which a known effect looks nearly the same
+LEAST_ALIKE = 0.5  # and from which it is named at all
 
 
 def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = ()) -> str:
@@ -83,13 +85,14 @@ def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = 
     similar effects."""
     title = _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title if r.channel in CHANNELS else r.channel)
     title = f"{title[:1].lower()}{title[1:]}"
-    how = r.manner or f"goes with {_over(r.depends_on)}"
+    how = r.manner or f"goes with {_over(r.depends_on, mechanism.name)}"
     text = f"Unexplained: {mechanism.title} {how} (probability {r.probability:.2f}"
     text += f"; {r.share:.0%} of the variance of the {title}"
     sure = np.isfinite(r.high) & ((r.low > 0.0) | (r.high < 0.0))  # a band without an end says no size
     if sure.any():
         at = int(np.argmax(np.where(sure, np.abs(r.f), -1.0)))
-        there = ", ".join(f"{v:.4g} {COORDINATES[n].unit}" for n, v in zip(r.depends_on, r.x[at], strict=True))
+        near = [_place(v, x) for v, x in zip(r.x[at].tolist(), r.x.T, strict=True)]
+        there = ", ".join(f"{v} {COORDINATES[n].unit}" for n, v in zip(r.depends_on, near, strict=True))
         text += f"; {_size(mechanism, float(r.f[at]))} at {there}"
     text += ")."
     for alike in ([m.title for m in instead], [f"one that goes with {_over([n])}" for n in r.proxies]):
@@ -97,11 +100,18 @@ def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = 
     # what comes again at equal ways does not at equal times, unless the speed never changes: then both are likely
     if {"t", "position"} & set(r.depends_on) and not r.manner.startswith(("in waves", "for ")):
         text += " Without a second pass, a place on the road and a moment in time cannot be distinguished."
-    if r.nearest is not None:
+    if r.nearest is not None and r.cosine >= LEAST_ALIKE:
         same = "looks nearly the same" if r.cosine >= ALIKE else "is nearest"
         known, _, where = r.nearest.partition("@")
         text += f" Of known effects, {name_of(known, where or None)} {same} (similarity {r.cosine:.2f} of 1)."
     return text
+
+
+def _place(value: float, points: FloatArray) -> str:
+    """A coordinate with the digits that the distance of its points has."""
+    step = float(np.diff(np.unique(points)).min(initial=math.inf))
+    digits = math.floor(math.log10(step)) if 0.0 < step < math.inf else -3
+    return f"{round(value, -digits) + 0.0:.{max(0, -digits)}f}"
 
 
 def _size(mechanism: Mechanism, f: float) -> str:
@@ -115,9 +125,9 @@ def short_form(remainder: Remainder) -> str:
     """`a force on the car that goes with speed`, `a force on the car from 66 s to 145 s`."""
     elsewhere = "" if remainder.manner else remainder.channel
     title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), elsewhere)
-    how = remainder.manner or f"that goes with {_over(remainder.depends_on)}"
+    how = remainder.manner or f"that goes with {_over(remainder.depends_on, remainder.mechanism)}"
     return f"{title} {how}".strip()
 
 
-def _over(names: Sequence[str]) -> str:
-    return " and ".join(COORDINATES[n].title for n in names)
+def _over(names: Sequence[str], mechanism: str | None = "") -> str:
+    return " and ".join("its own size" if n == mechanism else COORDINATES[n].title for n in names)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from string import Formatter
 
 from aqualog.core.units import displayed_unit
 from aqualog.diagnose.records import SURE, Cause, Estimate
-from aqualog.model.term import Effect, Term
+from aqualog.model.term import Effect, Parameter, Term
 
 __all__ = [
-    "CERTAIN", "PLACES", "cause_sentence", "listed", "name_of", "place", "quantity", "term_words", "verdict_sentence",
+    "CERTAIN", "PLACES", "cause_sentence", "change_words", "listed", "name_of", "place", "quantity", "term_words",
+    "verdict_sentence",
 ]  # fmt: skip
 
 MANY_UNTESTED = 5  # more than those of water, which no dry road shows
@@ -49,19 +51,41 @@ def term_words(term: Term) -> str:
     return f"{name_of(term.effect.name, term.where)}: {', '.join(said)}"
 
 
+def change_words(term: Term, deviations: Mapping[str, float]) -> str:
+    """`tyre radius (front axle) 0.27% larger (1.3 standard deviations)`: how far a model is from the vehicle file, by
+    the standard deviations of the file's values by parameter; 0 where one is not known."""
+    return listed([
+        f"{name_of(term.effect.name, term.where)} {_change(term.effect, p, term.values[p.name] - p.neutral)}"
+        + (f" ({abs(term.values[p.name] - p.neutral) / sd:.1f} standard deviations)" if sd else "")
+        for p in term.effect.parameters
+        if p.name in term.values and (sd := deviations.get(p.name, 0.0)) >= 0.0
+    ])  # fmt: skip
+
+
+def _change(effect: Effect, p: Parameter, change: float) -> str:
+    """`0.27% larger`, `0.1 m² smaller`: a share where the value is a factor, or the effect's sentence has per cent."""
+    is_share = p.neutral == 1.0 or any(n == p.name and "%" in (spec or "") for _, n, spec, _ in _parts(effect.sentence))
+    size = f"{abs(change):.2%}" if is_share else quantity(abs(change), p.unit)
+    return f"{size} {'larger' if change > 0.0 else 'smaller'}"
+
+
+def _parts(sentence: str) -> list[tuple[str, str | None, str | None, str | None]]:
+    return list(Formatter().parse(sentence))
+
+
 def cause_sentence(
     effect: Effect, where: str | None, parameters: Mapping[str, Estimate], drives: Sequence[str] = ()
 ) -> str:  # fmt: skip
     """The effect's own sentence with its values and the interval of the first one; `drives` that alone have it."""
     name, first = next(iter(parameters.items()))
-    values = {n: e.value for n, e in parameters.items()}
-    low, high, unit = first.low, first.high, first.unit
-    sentence = effect.sentence
-    if effect.less and first.value < 0.0:
-        sentence, values[name] = effect.less, -first.value
-        low, high = -high, -low
-    text = sentence.format(where=where or "", at=place(where), **values).rstrip(".")
-    if any(n == name and (spec or "").endswith("%") for _, n, spec, _ in Formatter().parse(sentence)):
+    factor, unit = effect.shown or (1.0, first.unit)
+    less = first.value < 0.0 and "|" in effect.sentence
+    low, high = (-factor * first.high, -factor * first.low) if less else (factor * first.low, factor * first.high)
+    values = {n: e.value for n, e in parameters.items()} | {name: (-factor if less else factor) * first.value}
+    sentence = re.sub(r"\[(.*?)\|(.*?)\]", r"\2" if less else r"\1", effect.sentence)
+    at = place(where) or (" (all wheels)" if "fl" in effect.places else "")
+    text = sentence.format(where=where or "", at=at, **values).rstrip(".")
+    if any(n == name and (spec or "").endswith("%") for _, n, spec, _ in _parts(sentence)):
         # in the unit in which the sentence has the value
         low, high, unit = 100.0 * low, 100.0 * high, "%"
     only = f" In {listed(drives)} only." if drives else ""
@@ -87,12 +111,12 @@ def listed(names: Sequence[str], last: str = "and") -> str:
 def verdict_sentence(
     verdict: str, causes: Sequence[Cause], *, level: float, reason: str = "", certain: frozenset[str] = frozenset(),
     seen: float | None = None, source: str = "log", untested: Mapping[str, str] | None = None,
-    moved: Sequence[Term] = (), unjudged: Sequence[str] = (),
+    moved: Sequence[str] = (), unjudged: Sequence[str] = (),
 ) -> str:  # fmt: skip
     """The verdict in one sentence, of a log that can be tested. `certain`: effects that are certain where others cannot
     be distinguished; `seen`: the test's p-value where it found more than noise; `source`: `log` or `campaign`;
-    `untested`: effects that the log cannot show, and why; `moved`: values of the vehicle file that the model has
-    otherwise; `unjudged`: water on which most of the drives was not judged."""
+    `untested`: effects that the log cannot show, and why; `moved`: in words, which values of the vehicle file
+    the model has otherwise; `unjudged`: water on which most of the drives was not judged."""
     names = [name_of(c.effect, c.where) + (f" in {listed(c.drives)}" if c.drives else "") for c in causes]
     if verdict == "no_effect" and seen is not None:
         return f"No effect is named: more than noise is left (p = {seen:.2g}), but no known effect explains it clearly."
@@ -105,7 +129,7 @@ def verdict_sentence(
             most = "" if why[0][1] == len(untested or {}) else f"{why[0][1]} of them: "
             few = f"; {len(untested or {})} effects were not tested ({most}{why[0][0]})"
         if moved:
-            few += f". For that it takes {listed([*map(term_words, moved)])}, as the vehicle file allows"
+            few += f". This holds with values that the vehicle file allows: {listed(moved)}"
         few += f". But {unjudged[0]}" if unjudged else ""
         return f"{agrees}{few}."
     if verdict == "named":

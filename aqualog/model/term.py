@@ -186,8 +186,9 @@ class Effect:
     """One physical effect that a model may have.
 
     `target`: the quantity that it changes. `places`: where it may sit, as `fl`, `f`, `left`, a signal's name; empty:
-    the whole car. `default`: place if none is given (None: the car). `apply` is pure and returns a new setup. `less`:
-    sentence for a negative first value, which it shows as positive. `campaign` None: a campaign does not show it.
+    the whole car. `default`: place if none is given (None: the car). `apply` is pure and returns a new setup. Of
+    `[more|less]` in the sentence the second stands for a negative first value, which is then shown as positive.
+    `shown`: factor and unit by which the sentence has the first value. `campaign` None: a campaign does not show it.
     `belongs`: what has it, and so which drives share its value; one of a drive or a moment differs from drive to drive.
     """
 
@@ -201,7 +202,7 @@ class Effect:
     default: str | None = None
     twins: tuple[str, ...] = ()
     table: Table | None = None
-    less: str = ""
+    shown: tuple[float, str] | None = None
     drive: DriveSearch = DriveSearch()
     campaign: CampaignSearch | None = None
     belongs: Belongs = "car"

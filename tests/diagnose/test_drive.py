@@ -181,6 +181,12 @@ def test_torque_of_one_axle_holds_no_brakes():
     assert not any("brakes" in n for n in prepare(whole, CAR, "a").notes)
 
 
+def test_more_braking_than_the_torque_explains_may_be_a_trailer_too():
+    log = changed(plain(), plain().frame.drop("brake_pressure").with_columns(pl.col("^torque_.*$").clip(-50.0)))
+    why = "explains (brakes, more drag or mass, or a trailer), driven stretches are used"
+    assert any(n.endswith(why) for n in prepare(log, CAR, "a").notes)
+
+
 def test_led_by_the_right_model_the_simulation_meets_the_measured_speed():
     right = Model((term("aero_drag", delta_drag_area=0.3),))
     d = prepare(signals(*right.terms), CAR, "a")

@@ -1,8 +1,13 @@
 """Sentences say what the numbers say, in one unit."""
 
+import math
+
+import numpy as np
 import pytest
 
-from aqualog.diagnose.records import Estimate
+from aqualog.diagnose.records import Estimate, Remainder
+from aqualog.diagnose.shapes import MECHANISMS
+from aqualog.diagnose.unknown_term import describe
 from aqualog.diagnose.words import cause_sentence, verdict_sentence
 from aqualog.model.effects import EFFECTS
 
@@ -43,12 +48,6 @@ def test_a_sentence_has_its_place_once():
     )
 
 
-def test_an_interval_has_the_unit_of_the_value():
-    text = told("tyre_radius", "fl", delta=Estimate(-0.01, -0.0102, -0.0098, "-"))
-    assert "-1.00%" in text
-    assert text.endswith("95 % interval -1.02 to -0.98 %.")
-
-
 def test_more_than_noise_and_nothing_large_is_one_sentence():
     text = verdict_sentence("no_effect", (), level=0.01, seen=0.0022)
     assert "more than noise is left (p = 0.0022)" in text
@@ -64,3 +63,44 @@ def test_no_effect_says_what_was_not_tested(count, said):
     }
     text = verdict_sentence("no_effect", (), level=0.01, untested=untested)
     assert text == f"No effect: the model agrees with the measurement, at a false-alarm level of {said}"
+
+
+@pytest.mark.parametrize(
+    ("effect", "where", "value", "half", "text"),
+    [
+        ("tyre_radius", None, 0.0245, 0.0049,
+         "The effective tyre radius (all wheels) is 2.45% larger than the vehicle file says; 95 % interval 2.0 to 2.9 %."),
+        ("tyre_radius", "f", -0.01, 0.0002,
+         "The effective tyre radius (front axle) is 1.00% smaller than the vehicle file says; "
+         "95 % interval 0.98 to 1.02 %."),
+        ("aero_drag", None, 0.2, 0.02,
+         "The drag area is 0.20 m² larger than the vehicle file says; 95 % interval 0.18 to 0.22 m²."),
+        ("head_wind", None, -3.0, 0.5, "A tail wind of 3.0 m/s blew; 95 % interval 2.5 to 3.5 m/s."),
+        ("cornering_drag", None, 0.0257, 0.003,
+         "Curves at 4 m/s² slow the car by 0.41 m/s² more than the model says; 95 % interval 0.36 to 0.46 m/s²."),
+        ("tyre_radius_growth", None, 2e-6, 4e-7,
+         "The tyre radius (all wheels) grows by 0.26% up to 130 km/h; 95 % interval 0.21 to 0.31 %."),
+        ("track_clearing", None, -2e-4, 1e-4,
+         "The front wheels leave 0.20 mm less film than the tyre model says; 95 % interval 0.10 to 0.30 mm."),
+        ("slip_stiffness_drift", "f", 2e-4, 5e-5,
+         "The slip slope (front axle) changes by +1.2% a minute; 95 % interval 0.9 to 1.5 %."),
+    ],
+)  # fmt: skip
+def test_a_sentence_says_from_what_and_in_which_direction(effect, where, value, half, text):
+    own = EFFECTS[effect].parameters[0]
+    assert told(effect, where, **{own.name: Estimate(value, value - half, value + half, own.unit)}) == text
+
+
+@pytest.mark.parametrize(
+    ("cosine", "last"), [(0.4, "here."), (0.6, "Of known effects, load sensitivity is nearest (similarity 0.60 of 1).")]
+)
+def test_a_place_has_the_digits_of_its_points(cosine, last):
+    x = np.linspace(-2421.741, 965.862843, 60)[:, None]
+    f = np.linspace(0.0, 0.468, 60)
+    mechanism = next(m for m in MECHANISMS if m.name == "torque")
+    r = Remainder("force_balance", ("torque",), 0.58, math.nan, x, f, f - 0.1, f + 0.1, (), "load_sensitivity", cosine, "",
+                  "torque", "-", 0.75)  # fmt: skip
+    text = describe(mechanism, r, [mechanism])
+    assert "; +46.8% at 970 N·m)" in text
+    assert "goes with its own size (" in text
+    assert text.endswith(last)
