@@ -21,7 +21,7 @@ from aqualog.align.freezes import (
     unread_note,
     watch_of,
     within,
-)
+)  # fmt: skip
 from aqualog.align.glitches import KNOWN_NS, Glitches, glitches_of
 from aqualog.align.mapping import Entry, SignalMap
 from aqualog.align.timebase import MEDIAN_OF

@@ -147,7 +147,8 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     every_wheel, pressed = torqued and all(f"torque_{w}" in filled for w in WHEELS), filled.get("brake_pressure")
     if pressed is not None and not (every_wheel and inputs.brakes_in_torque(pressed, torque, v, vehicle, dt)):
         bad |= pressed > inputs.BRAKE_PRESSURE
-        notes.append("braking is left out: its torque is not in the log")
+        why = "the logged torque explains too little of it" if every_wheel else "its torque is not in the log"
+        notes.append(f"braking is left out: {why}")
     if not torqued:
         bad |= np.gradient(speed, dt) > inputs.A_MOST
         # a motor slows the car too, and presses no brake; an accelerometer shows offsets and roads all the same

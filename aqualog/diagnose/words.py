@@ -10,7 +10,7 @@ from string import Formatter
 
 from aqualog.core.units import displayed_unit
 from aqualog.diagnose.records import SURE, Cause, Estimate
-from aqualog.model.term import Effect, Parameter, Term
+from aqualog.model.term import Effect, Term
 
 __all__ = [
     "CERTAIN", "PLACES", "cause_sentence", "change_words", "listed", "name_of", "place", "quantity", "term_words",
@@ -53,24 +53,19 @@ def term_words(term: Term) -> str:
 
 def change_words(term: Term, deviations: Mapping[str, float]) -> str:
     """`tyre radius (front axle) 0.27% larger (1.3 standard deviations)`: how far a model is from the vehicle file, by
-    the standard deviations of the file's values by parameter; 0 where one is not known."""
-    return listed([
-        f"{name_of(term.effect.name, term.where)} {_change(term.effect, p, term.values[p.name] - p.neutral)}"
-        + (f" ({abs(term.values[p.name] - p.neutral) / sd:.1f} standard deviations)" if sd else "")
-        for p in term.effect.parameters
-        if p.name in term.values and (sd := deviations.get(p.name, 0.0)) >= 0.0
-    ])  # fmt: skip
+    the standard deviations of the file's values by parameter, where they are known."""
+    said = []
+    for p in (p for p in term.effect.parameters if p.name in term.values):
+        change, sd = term.values[p.name] - p.neutral, deviations.get(p.name, 0.0)
+        is_share = p.neutral == 1.0 or _is_percent(term.effect.sentence, p.name)
+        size = f"{abs(100.0 * change):.3g}%" if is_share else quantity(abs(change), p.unit)
+        by = f" ({abs(change) / sd:.1f} standard deviations)" if sd else ""
+        said.append(f"{name_of(term.effect.name, term.where)} {size} {'larger' if change > 0.0 else 'smaller'}{by}")
+    return listed(said)
 
 
-def _change(effect: Effect, p: Parameter, change: float) -> str:
-    """`0.27% larger`, `0.1 m² smaller`: a share where the value is a factor, or the effect's sentence has per cent."""
-    is_share = p.neutral == 1.0 or any(n == p.name and "%" in (spec or "") for _, n, spec, _ in _parts(effect.sentence))
-    size = f"{abs(change):.2%}" if is_share else quantity(abs(change), p.unit)
-    return f"{size} {'larger' if change > 0.0 else 'smaller'}"
-
-
-def _parts(sentence: str) -> list[tuple[str, str | None, str | None, str | None]]:
-    return list(Formatter().parse(sentence))
+def _is_percent(sentence: str, name: str) -> bool:
+    return any(n == name and (spec or "").endswith("%") for _, n, spec, _ in Formatter().parse(sentence))
 
 
 def cause_sentence(
@@ -85,7 +80,7 @@ def cause_sentence(
     sentence = re.sub(r"\[(.*?)\|(.*?)\]", r"\2" if less else r"\1", effect.sentence)
     at = place(where) or (" (all wheels)" if "fl" in effect.places else "")
     text = sentence.format(where=where or "", at=at, **values).rstrip(".")
-    if any(n == name and (spec or "").endswith("%") for _, n, spec, _ in _parts(sentence)):
+    if _is_percent(sentence, name):
         # in the unit in which the sentence has the value
         low, high, unit = 100.0 * low, 100.0 * high, "%"
     only = f" In {listed(drives)} only." if drives else ""

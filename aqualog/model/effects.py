@@ -190,8 +190,7 @@ _ALL = [
         "road_grade", "slope angle of the road [rad]", "The road [climbs|falls] by {grade:.1%}.",
         "motorways to 3-4 % (V, DMRB [dmrb2020])",
         (Parameter("grade", "rad", 0.0, 0.02, -0.2, 0.2, 0.002, "slope angle, uphill positive"),), _road_grade,
-        twins=("accelerometer_bias",),
-        drive=DriveSearch(("a_x or wheel torque",), turns=True), belongs="drive",
+        twins=("accelerometer_bias",), drive=DriveSearch(("a_x or wheel torque",), turns=True), belongs="drive",
     ),
     Effect(
         "head_wind", "speed through the air [m/s]", "A [head|tail] wind of {speed:.1f} m/s blew.", "±5 m/s (K)",
@@ -204,8 +203,7 @@ _ALL = [
         "The drag area is {delta_drag_area:.2f} m² [larger|smaller] than the vehicle file says.", "roof box +0.2 (K)",
         (Parameter("delta_drag_area", "m^2", 0.0, 0.1, -0.5, 2.0, 0.02, "on top of the vehicle file's",
             DayToDay("drag", lambda sd, *_: sd, "drag_area")),),
-        _plus(drag_area="delta_drag_area"), twins=("head_wind",),
-        drive=DriveSearch((_TORQUE,)),
+        _plus(drag_area="delta_drag_area"), twins=("head_wind",), drive=DriveSearch((_TORQUE,)),
     ),
     Effect(
         "rolling_resistance", "rolling resistance coefficient [-]",
@@ -256,8 +254,7 @@ _ALL = [
         (Parameter("delta_mass", "kg", 0.0, 100.0, -500.0, 3000.0, 20.0, "at the place",
             DayToDay("inertia", _as_mass, "mass")),), _on_plant(_payload),
         ("f", "r"), twins=("torque_gain",),
-        drive=DriveSearch((_TORQUE,), places=(None, "f", "r"), is_single=True, check=WEIGHED),
-        belongs="drive",
+        drive=DriveSearch((_TORQUE,), places=(None, "f", "r"), is_single=True, check=WEIGHED), belongs="drive",
     ),
     Effect(
         "torque_gain", "torque at the wheels over the reported one [-]",
@@ -393,8 +390,7 @@ _ALL = [
             leak_radius=_changed(p.leak_radius, w, np.add, v["radius"]),
             leak_slope=_changed(p.leak_slope, w, np.add, v["slope"]), leak_start=v["start"], leak_time=v["duration"])),
         _WHEEL_PLACES, twins=("tyre_radius",),
-        drive=DriveSearch((_SPEEDS,), by_wheel=True, variants=_leaks, begins_like="tyre_radius"),
-        belongs="moment",
+        drive=DriveSearch((_SPEEDS,), by_wheel=True, variants=_leaks, begins_like="tyre_radius"), belongs="moment",
     ),
     Effect(
         "tyre_radius_growth", "rolling radius over speed [s^2/m^2]",
@@ -425,8 +421,7 @@ _ALL = [
         "The front wheels leave {delta_film:.2f} mm [more|less] film than the tyre model says.", "below 0.6 mm (D)",
         (Parameter("delta_film", "m", 0.0, 6e-4, -5e-4, 5e-3, 2e-4, "on the tyre's own"),),
         _on_plant(lambda p, v, _: p._replace(h_track=np.maximum(p.h_track + v["delta_film"], 0.0))),
-        twins=("water_drag",),
-        drive=DriveSearch((_WATER,), tolerance=1.5e-4),
+        twins=("water_drag",), drive=DriveSearch((_WATER,), tolerance=1.5e-4),
         campaign=CampaignSearch(0, (None,),
             "The film that the front wheels leave to the rear ones differs by {0.value:+.2f} mm "
             "(95 %: {0.low:+.2f} ... {0.high:+.2f} mm) from the tyre model's.", scale=1e3,
@@ -450,8 +445,7 @@ _ALL = [
         "clock_skew", "clock of a bus [ppm]", "The clock of the signal{at} runs {skew:.0f} ppm too [fast|slow].",
         "quartz 20-100 ppm (K)",
         (Parameter("skew", "ppm", 0.0, 100.0, -1e5, 1e5, 100.0, "fast positive"),), _clock_skew, _SIGNALS, "v_x",
-        twins=("signal_delay",),
-        drive=DriveSearch(places=("v_x", "a_x", "torque_fl"), is_shift=True), belongs="drive",
+        twins=("signal_delay",), drive=DriveSearch(places=("v_x", "a_x", "torque_fl"), is_shift=True), belongs="drive",
     ),
 ]  # fmt: skip
 
