@@ -58,14 +58,17 @@ def own_sd(vehicle: Vehicle, path: str) -> float:
     return 0.0 if is_bound and path in ("mass", "torque_gain") else uncertainty(vehicle, path)
 
 
-def in_words(terms: Sequence[Term], asked: Sequence[Hypothesis], vehicle: Vehicle) -> list[str]:
-    """Values that a model has otherwise than the file, each in standard deviations of the file's value."""
-    by_key = {h.key: h for h in asked if not h.drive}
-    keys = [t.effect.name + (f"@{t.where}" if t.where else "") for t in terms]
-    return [
-        change_words(t, {n: deviation(by_key[k], n, vehicle) for n in t.values} if k in by_key else {})
-        for t, k in zip(terms, keys, strict=True)
-    ]
+def in_words(terms: Sequence[Term], asked: Sequence[Hypothesis], before: Model, vehicle: Vehicle) -> list[str]:
+    """Values that a model has otherwise than before, each in standard deviations of the file's value."""
+    known = {(t.effect.name, t.where): t.values for t in before.terms}
+    asked_at = {(h.effect.name, h.where): h for h in asked if not h.drive}
+
+    def said(t: Term) -> str:
+        h = asked_at.get((t.effect.name, t.where))
+        sds = {} if h is None else {n: deviation(h, n, vehicle) for n in t.values}
+        return change_words(t, known.get((t.effect.name, t.where), {}), sds)
+
+    return [*map(said, terms)]
 
 
 def with_known(model: Model, vehicle: Vehicle) -> Model:

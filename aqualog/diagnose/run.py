@@ -91,7 +91,7 @@ def _diagnosed(
     options: Options, tell: Tell, late: Late,
 ) -> Diagnosis:  # fmt: skip
     """The diagnosis beside delays that are known from elsewhere."""
-    model = with_known(given, vehicle)
+    model = known = with_known(given, vehicle)
     tell("preparing", 0.0)
     ready, notes = _prepared(drives, vehicle)
     notes += tuple(f"Known: {term_words(t)}." for t in model.terms[len(given.terms) :])
@@ -149,7 +149,7 @@ def _diagnosed(
     sentence = by_drives(found.arena.parts, len(drives)) + verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
         seen=p if p <= options.level else None, untested=untested | seen.untested,
-        moved=in_words(bare.terms[len(with_known(given, vehicle).terms) :], evidence.asked, vehicle),
+        moved=in_words(bare.terms[len(known.terms) :], evidence.asked, known, vehicle),
         unjudged=[n for d in ready for n in d.notes if ON_WATER in n],
     )  # fmt: skip
     return Diagnosis(
@@ -197,7 +197,7 @@ def _simulated(
     moved = recentred(evidence, model)
     if moved != model:
         new = tuple(t for t in moved.terms if t not in model.terms)
-        fitted = listed(in_words(new, asked, ready[0].vehicle))
+        fitted = listed(in_words(new, asked, bare, ready[0].vehicle))
         notes = (f"The vehicle file allows other values. The verdict holds with those that fit best: {fitted}.",)
         model, bare = moved, Model((*bare.terms, *new))
         ready = [led_by(d, model) for d in ready]

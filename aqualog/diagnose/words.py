@@ -51,12 +51,12 @@ def term_words(term: Term) -> str:
     return f"{name_of(term.effect.name, term.where)}: {', '.join(said)}"
 
 
-def change_words(term: Term, deviations: Mapping[str, float]) -> str:
-    """`tyre radius (front axle) 0.27% larger (1.3 standard deviations)`: how far a model is from the vehicle file, by
-    the standard deviations of the file's values by parameter, where they are known."""
+def change_words(term: Term, known: Mapping[str, float], deviations: Mapping[str, float]) -> str:
+    """`tyre radius (front axle) 0.27% larger (1.3 standard deviations)`: how far a term's values are from `known` ones,
+    else from no effect, by the standard deviations of the file's values, where there are any."""
     said = []
     for p in (p for p in term.effect.parameters if p.name in term.values):
-        change, sd = term.values[p.name] - p.neutral, deviations.get(p.name, 0.0)
+        change, sd = term.values[p.name] - known.get(p.name, p.neutral), deviations.get(p.name, 0.0)
         is_share = p.neutral == 1.0 or _is_percent(term.effect.sentence, p.name)
         size = f"{abs(100.0 * change):.3g}%" if is_share else quantity(abs(change), p.unit)
         by = f" ({abs(change) / sd:.1f} standard deviations)" if sd else ""

@@ -8,8 +8,9 @@ import pytest
 from aqualog.diagnose.records import Estimate, Remainder
 from aqualog.diagnose.shapes import MECHANISMS
 from aqualog.diagnose.unknown_term import describe
-from aqualog.diagnose.words import cause_sentence, verdict_sentence
+from aqualog.diagnose.words import cause_sentence, change_words, verdict_sentence
 from aqualog.model.effects import EFFECTS
+from aqualog.model.term import Term
 
 
 def told(effect, where, **estimates):
@@ -104,3 +105,15 @@ def test_a_place_has_the_digits_of_its_points(cosine, last):
     assert "; +46.8% at 970 N·m)" in text
     assert "goes with its own size (" in text
     assert text.endswith(last)
+
+
+def test_a_change_is_from_the_known_value_in_standard_deviations():
+    at = {"effect": EFFECTS["tyre_radius"], "where": "f"}
+    text = change_words(Term(**at, values={"delta": -0.0034}), {}, {"delta": 0.0017})
+    assert text == "tyre radius (front axle) 0.34% smaller (2.0 standard deviations)"
+    late = Term(EFFECTS["signal_delay"], {"delay": 0.074}, "v_x")
+    text = change_words(late, {"delay": 0.1}, {})
+    assert text == "signal delay (reference velocity) 0.026 s smaller"
+    stiff = Term(EFFECTS["slip_stiffness"], {"gain": 1.11}, "f")
+    text = change_words(stiff, {}, {"gain": 0.08})
+    assert text == "slip stiffness (front axle) 11% larger (1.4 standard deviations)"
