@@ -10,7 +10,7 @@ from aqualog.diagnose.drive import BEYOND_GRIP, prepare
 from aqualog.diagnose.inputs import brakes_unlogged
 from aqualog.model.scenario import Lane
 from aqualog.model.sensors import IDEAL
-from tests.diagnose.test_drive import CAR, changed, signals, term
+from tests.diagnose.test_drive import CAR, changed, signals
 
 SPEED = ((0.0, 22.0), (28.0, 22.0), (32.0, 34.0), (44.0, 34.0), (52.0, 20.0))
 LANES = tuple(Lane(t, t + 6.0, in_metres=False, depth_left=1.5e-3, depth_right=1.7e-3) for t in (8.0, 18.0, 36.0, 60.0))
