@@ -12,9 +12,9 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 97_022
+MOST_LINES = 97_158
 MOST_FILES = 502
-MOST_TEST_LINES = 71_779
+MOST_TEST_LINES = 72_012
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100
