@@ -244,7 +244,8 @@ _ALL = [
     ),
     Effect(
         "cornering_drag", "resistance in curves [s^2/m]",
-        "Curves at 4 m/s² slow the car by {coefficient:.2f} m/s² [more|less] than the model says.", "scrub, toe (K)",
+        "At 4 m/s² of lateral acceleration, curves slow the car by {coefficient:.2f} m/s² [more|less] than modelled.",
+        "scrub, toe (K)",
         (Parameter("coefficient", "s^2/m", 0.0, 0.005, -0.02, 0.1, 0.001, "F = coefficient m a_y^2"),),
         _plus(cornering_drag="coefficient"), drive=DriveSearch((_TORQUE,), tolerance=0.003), shown=(16.0, "m/s^2"),
     ),

@@ -78,7 +78,8 @@ def test_no_effect_says_what_was_not_tested(count, said):
          "The drag area is 0.20 m² larger than the vehicle file says; 95 % interval 0.18 to 0.22 m²."),
         ("head_wind", None, -3.0, 0.5, "A tail wind of 3.0 m/s blew; 95 % interval 2.5 to 3.5 m/s."),
         ("cornering_drag", None, 0.0257, 0.003,
-         "Curves at 4 m/s² slow the car by 0.41 m/s² more than the model says; 95 % interval 0.36 to 0.46 m/s²."),
+         "At 4 m/s² of lateral acceleration, curves slow the car by 0.41 m/s² more than modelled; "
+         "95 % interval 0.36 to 0.46 m/s²."),
         ("tyre_radius_growth", None, 2e-6, 4e-7,
          "The tyre radius (all wheels) grows by 0.26% up to 130 km/h; 95 % interval 0.21 to 0.31 %."),
         ("track_clearing", None, -2e-4, 1e-4,
