@@ -325,7 +325,7 @@ def test_the_air_of_a_trailer_is_no_water(car):
 
 DRY = (
     ("rough_asphalt", 30, 0.5), ("torque_vectoring", 20, 0.5), ("gear_shifts", 23, 0.5), ("snow", 300, 0.5),
-    ("split_friction", 303, 0.5), ("pressure_loss", 71004, 1.0), ("dropouts", 71496, 1.0),
+    ("split_friction", 303, 0.5), ("pressure_loss", 71004, 1.0), ("pressure_loss", 990018, 1.0), ("dropouts", 71496, 1.0),
 )  # fmt: skip
 
 

@@ -391,7 +391,7 @@ def _fill(p, m, wet, near):  # type: ignore[no-untyped-def]
     # what a car has not shown on dry road yet is no sign of water
     x, P = m.x[0], m.x[1]
     drag = max(math.asinh(p.drags / p.scale_R), _SURE * math.sqrt(P[0]))
-    drags = P[0] >= _UNKNOWN or x[0] > drag
+    drags = P[0] < _UNKNOWN and x[0] > drag
     # a tyre that loses its air only slips, and alone; a car that rolls easier than before has been taught by water
     both = x[1] * x[2] > 0.0 and abs(x[2]) > max(p.both, _SURE * math.sqrt(P[2])) and x[0] > -drag
     shakes = max(x[3], x[4]) > max(p.shakes, _SURE * m.body[2])
