@@ -159,7 +159,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         unlogged = "" if every_wheel else "the torque is that of one axle: brakes are not in the log"
         wet = _widened(floats | (_depth(course) > 0.0), BESIDE_S, dt)
         if every_wheel and inputs.brakes_unlogged(torque, v, wet, vehicle, dt):
-            unlogged = "the car slows down more than its torque explains (brakes, more drag or mass, or a trailer)"
+            unlogged = "the car slows down more than its torque explains (brakes, more drag, or a trailer)"
         if unlogged:
             bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.arm("fl")
             notes.append(f"{unlogged}, driven stretches are used")

@@ -184,7 +184,7 @@ def test_torque_of_one_axle_holds_no_brakes():
 def test_more_braking_than_the_torque_explains_may_be_a_trailer_too():
     hard = signals(speed=((0.0, 20.0), (20.0, 34.0), (40.0, 34.0), (48.0, 12.0), (90.0, 12.0)))
     log = changed(hard, hard.frame.drop("brake_pressure").with_columns(pl.col("^torque_.*$").clip(0.0)))
-    why = "explains (brakes, more drag or mass, or a trailer), driven stretches are used"
+    why = "explains (brakes, more drag, or a trailer), driven stretches are used"
     assert any(n.endswith(why) for n in prepare(log, CAR, "a").notes)
 
 
