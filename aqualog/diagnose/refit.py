@@ -17,9 +17,11 @@ from aqualog.diagnose.evidence import FARTHEST, Evidence
 from aqualog.diagnose.hypotheses import Hypothesis, residual, signatures, value_in, with_free, with_values
 from aqualog.diagnose.noise import Noise, Weighing, bridged, whitened
 from aqualog.diagnose.words import name_of
-from aqualog.model.term import Model
+from aqualog.model.term import Model, Term
 
-__all__ = ["KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "likeliest", "metric", "refit", "repeats", "secants", "silent"]
+__all__ = [
+    "KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "likeliest", "metric", "refit", "repeats", "secants", "silent", "strained",
+]  # fmt: skip
 
 KNOWN = 0.25  # share of the tolerances that values and intervals take into account
 PRIOR_WIDTH = 3.0  # the prior is this much wider than the effect's: it only keeps huge, cancelling pairs apart
@@ -36,6 +38,7 @@ BY_WHEELS = 1.0 / 3.0
 # what effects show one by one, over what they show together, from which on they cancel: ten right pairs of another
 # simulator had 0.7 to 1.1, a torque gain with a trailer for a slip slope 12 (S)
 CANCELS = 3.0
+END = 0.999  # of a tolerance, from which on a value stands at its end
 _ORDINAL = ("the first", "the second", "the last")
 
 
@@ -151,6 +154,21 @@ def likeliest(evidence: Evidence, measure: Metric, residuals: Sequence[FloatArra
             at = [(n, h.parameter(n), value_in(model, h, n) + theta[c]) for n, c in zip(h.free, columns, strict=True)]
             own.append((h, {n: min(max(float(x), p.low), p.high) for n, p, x in at}))
     return with_values(model, own)
+
+
+def strained(evidence: Evidence, model: Model, settled: Model) -> tuple[Term, ...]:
+    """Effects worth naming whose values `likeliest` has moved from a model as far as a tolerance goes: there a fault
+    is as likely as an error of the file."""
+    out = []
+    new = {(t.effect.name, t.place): t for t in settled.terms if t not in model.terms}
+    for h, columns in zip(evidence.asked, evidence.columns, strict=True):
+        term = new.get((h.effect.name, h.where or h.effect.default))
+        if h.allowed or term is None:
+            continue
+        each = [(n, abs(term.values[n] - value_in(model, h, n)), c) for n, c in zip(h.free, columns, strict=True)]
+        if any(x > END * FARTHEST * evidence.forgiven[c] and x >= h.worth_naming(n) for n, x, c in each):
+            out.append(term)
+    return tuple(out)
 
 
 def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure: Metric, model: Model) -> Refit | None:

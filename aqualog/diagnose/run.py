@@ -30,7 +30,7 @@ from aqualog.diagnose.next_manoeuvre import Rival, next_manoeuvre
 from aqualog.diagnose.noise import Noise, fit_noise
 from aqualog.diagnose.outcome import agreements, conclude, contradicted, widened, with_causes
 from aqualog.diagnose.records import SURE, Agreement, Consequence, Diagnosis, Gain, Remainder, ResidualView
-from aqualog.diagnose.refit import Refit, likeliest, metric
+from aqualog.diagnose.refit import Refit, likeliest, metric, strained
 from aqualog.diagnose.search import Found, Option, Tell, search, simulated
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.unexplained import slow_force
@@ -170,11 +170,28 @@ def _diagnosed(
         deviations=tuple(t for t in settled.terms if t not in extended.terms),
         channels=ready[0].channels,
         untested=untested | seen.untested,
-        notes=(*notes, *outcome.notes, *seen.notes, *((_SHARED,) if any(c.drives for c in outcome.causes) else ())),
+        notes=(
+            *notes,
+            *outcome.notes,
+            *seen.notes,
+            *_strained(found, evidence, extended, settled, vehicle),
+            *((_SHARED,) if any(c.drives for c in outcome.causes) else ()),
+        ),
         views=_views(ready, before, after, {n for c in outcome.causes for n in c.drives}) if options.views else (),
         agreement=tuple(a for a in agreed if a.key in named),
         caution=not_calibrated(vehicle, ready[0].channels),
     )
+
+
+def _strained(found: Found, evidence: Evidence, extended: Model, settled: Model, vehicle: Vehicle) -> tuple[str, ...]:
+    """A note on what is as far from the file as a tolerance goes, and is not named."""
+    if settled == extended:  # nothing is named: not looked for yet
+        settled = likeliest(evidence, metric(found.arena, found.posterior.weighings), evidence.residuals, extended)
+    each = strained(evidence, extended, settled)
+    if not each:
+        return ()
+    said = listed(in_words(each, evidence.asked, extended, vehicle))
+    return (f"Not named, but at the end of what is tolerated: {said}. Check {'it' if len(each) == 1 else 'them'}.",)
 
 
 def _simulated(

@@ -13,7 +13,7 @@ from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.evidence import FARTHEST
 from aqualog.diagnose.hypotheses import Hypothesis, residual, with_values
 from aqualog.diagnose.hypotheses import simulated as shown
-from aqualog.diagnose.refit import KNOWN, likeliest, metric, refit, secants
+from aqualog.diagnose.refit import KNOWN, likeliest, metric, refit, secants, strained
 from aqualog.diagnose.search import simulated
 from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model.effects import EFFECTS
@@ -192,6 +192,21 @@ def test_the_cars_own_values_are_likeliest_within_the_tolerance_and_a_known_term
     known = Model((term("tyre_radius", "rl", delta=0.05),))
     kept = likeliest(evidence, measure, evidence.residuals, known).terms[0]
     assert kept.values["delta"] == 0.05
+
+
+@pytest.mark.parametrize(("gain", "strains"), [(1.0, False), (1.02, False), (1.08, True)])
+def test_a_value_at_the_end_of_its_tolerance_is_strained_where_it_is_worth_naming(gain, strains):
+    asked = [one("accelerometer_gain", "a_x"), one("tyre_radius", "rl"), one("head_wind")]
+    evidence, _, _ = prepared(
+        asked, term("accelerometer_gain", "a_x", gain=gain), term("tyre_radius", "rl", delta=1e-2)
+    )
+    arena = known_only(arena_of(evidence, ()))
+    settled = likeliest(evidence, metric(arena, compete(arena).weighings), evidence.residuals, Model())
+    # a tolerated error of the radius is too small for a name
+    assert [(t.effect.name, t.where) for t in strained(evidence, Model(), settled)] == [
+        ("accelerometer_gain", "a_x")
+    ] * strains
+    assert strained(evidence, settled, settled) == ()
 
 
 def test_a_curve_that_bends_early_is_not_taken_for_less_friction():
