@@ -20,7 +20,8 @@ from aqualog.diagnose.words import name_of
 from aqualog.model.term import Model, Term
 
 __all__ = [
-    "KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "likeliest", "metric", "refit", "repeats", "secants", "silent", "strained",
+    "KNOWN", "PRIOR_WIDTH", "Metric", "Refit", "likeliest", "metric", "refit", "repeats", "secants", "silent",
+    "strained",
 ]  # fmt: skip
 
 KNOWN = 0.25  # share of the tolerances that values and intervals take into account

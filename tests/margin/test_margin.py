@@ -151,6 +151,26 @@ def test_who_stays_in_the_water_stays_warned(car, speed):
     assert warned[in_water].mean() > 0.8
 
 
+@pytest.mark.parametrize("car", [CAR, FWD], ids=["rwd", "fwd"])
+def test_who_enters_the_water_while_speeding_up_is_warned(car):
+    """There the resistance does not count, since an unknown trailer shows more than water. The slips do, with doubt."""
+    speed = ((0.0, 80.0), (7.0, 80.0), (15.0, 114.6))
+    columns = drive(car, duration_s=15.0, lanes=(lane(9.0, 15.0, 2e-3),), speed_kmh=speed, seed=1)[0]
+    found = detect_drive(columns, car)
+    warned = next(t.active for t in found.tracks if t.detector == "margin")
+    assert not warned[:880].any()
+    assert warned[1050:].mean() > 0.8
+
+
+@pytest.mark.parametrize(
+    ("situation", "seed"), [("wind_shelter", 990010), ("wind_shelter", 990058), ("pressure_loss", 1002002)]
+)
+def test_wind_while_speeding_up_and_a_tyre_that_loses_its_air_are_no_water(situation, seed):
+    d = draw(situation, seed, SCORING_POOL)
+    found = detect_drive(as_signals(simulate(d.scenario, d.model), vehicle=d.believed), d.believed, samples=False)
+    assert not [e for e in found.events if e.detector == "margin"]
+
+
 def test_jumps_that_go_on_are_no_gear_shift():
     """A traction control takes torque away and gives it back for as long as the wheels spin. Slips count meanwhile."""
     t = np.arange(600) * 0.01

@@ -20,7 +20,7 @@ V_MIN = 5.0  # [m/s] slower, wheel speeds are too coarse
 A_Y_MAX = 2.5  # [m/s^2] beyond, cornering costs more than the balance knows
 TAU_A = 0.5  # [s] of the acceleration that these limits are for, about the window's length
 A_MOST, A_LEAST = 1.5, -1.5  # [m/s^2] beyond, no slip counts; braking
-HURRY = 0.5  # [m/s^2] beyond, an unknown trailer, or a torque that is off by a tenth, shows more than water
+HURRY = 0.5  # [m/s^2] beyond, an unknown trailer, or a torque that is off by a tenth, takes more than water
 U_MOST, FORCED = 0.6, 0.35  # [-] of the traction: beyond, no slip counts; the slip of a dry tyre is known roughly
 LOAD_LEAST = 100.0  # [N] of a wheel that lifts off in a curve
 JUMP = 0.02  # [-] of the traction within a tenth of a second: a gear shift, which torque signals report late
@@ -57,7 +57,7 @@ class Reader:
             rolls = (v > V_MIN) & ~scene.is_braking
             trusted = rolls & (a < A_MOST) & (a > A_LEAST) & ~(np.abs(f["a_y_slow"]) > A_Y_MAX)
             known = ~jump & ~(a > HURRY)
-            rough = ~known | (np.max(np.abs(u), axis=0) > FORCED)
+            rough = jump | (np.max(np.abs(u), axis=0) > FORCED)
         R = np.where(trusted & known, f["delta_a_x"], np.nan)
         turning, pairs = [self._turning(scene, w) for w in WHEELS], []
         for one, other in PAIRS:

@@ -36,6 +36,7 @@ _NV, _NX, _NN = FULL_SPEEDS.size, len(FEATURES), NODES.size
 _LOG = np.log(FULL_SPEEDS)
 _QUANTILES = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
 _SURE = 1.645  # standard deviations of a quantile of 95 %
+_CLEAR = 2.6  # the same of a drag, which is asked for as long as water is held for likely
 _STILL = 0.25  # variance of what wheels shake that shake as on dry road, of 0.6 s in log variance
 _NEVER, _FAINT = -40.0, 1e-12  # of an evidence: below the best, and itself
 _UNKNOWN = 1e4  # variance of a feature that is missing
@@ -110,7 +111,8 @@ def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
         if math.isnan(row[_D + i] + front + rear):
             continue
         away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
-        _learn_line(g, front + rear, away, p.noise_D**2 + row[_VAR + i], trust)
+        late = p.doubt * (front + rear) if math.isnan(row[_R]) else 0.0
+        _learn_line(g, front + rear, away, p.noise_D**2 + row[_VAR + i] + late * late, trust)
 
 
 @part
@@ -161,7 +163,7 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
     m.body[2] = rough
     for i in range(3):
         g, slip, shake = m.sides[i], _SLIP[i], _SHAKE[i]
-        n, e, e2, h, within = 0.0, 0.0, 0.0, 0.0, 0.0
+        n, e, e2, h, late, within = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for k in range(ROWS):
             row = m.window[k]
             front, rear = _pair(row, i)
@@ -169,15 +171,18 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
                 continue
             away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
             n, e, e2, h, within = n + 1.0, e + away, e2 + away * away, h + front + rear, within + row[_VAR + i]
+            late += front + rear if math.isnan(row[_R]) else 0.0
         x[slip], P[slip], x[shake], P[shake] = 0.0, _UNKNOWN, 0.0, _UNKNOWN
         if n >= 3.0:
-            e, h = e / n, h / n
+            e, h, late = e / n, h / n, p.doubt * late / n
             x[slip] = math.asinh(e / p.scale_D)
             x[shake] = math.log(max(e2 / n - e * e, 0.0) + within / n + _LEAST) - g[5]
             P[shake] = g[6] + rough * rough
             # what shakes on dry road leaves the mean of few samples unsure; a slip within twice of that is none
             noise = math.exp(g[5] + max(min(rough, x[shake]), 0.0)) / (n * p.block)
-            P[slip] = (g[2] + 2.0 * h * g[3] + h * h * g[4] + noise) / (p.scale_D**2 + max(e * e - 4.0 * noise, 0.0))
+            P[slip] = (g[2] + 2.0 * h * g[3] + h * h * g[4] + late * late + noise) / (
+                p.scale_D**2 + max(e * e - 4.0 * noise, 0.0)
+            )
     more = 1 if P[1] >= _UNKNOWN or (P[2] < _UNKNOWN and abs(x[2]) > abs(x[1])) else 0
     return traction / max(steps, 1.0), more
 
@@ -390,10 +395,11 @@ def _fill(p, m, wet, near):  # type: ignore[no-untyped-def]
     m.out[1] = near * wet if m.x[1, 1] < p.vague else 0.0
     # what a car has not shown on dry road yet is no sign of water
     x, P = m.x[0], m.x[1]
-    drag = max(math.asinh(p.drags / p.scale_R), _SURE * math.sqrt(P[0]))
-    drags = P[0] < _UNKNOWN and x[0] > drag
+    least, unsure = math.asinh(p.drags / p.scale_R), math.sqrt(P[0])
+    drags = P[0] < _UNKNOWN and x[0] > max(least, _CLEAR * unsure)
     # a tyre that loses its air only slips, and alone; a car that rolls easier than before has been taught by water
-    both = x[1] * x[2] > 0.0 and abs(x[2]) > max(p.both, _SURE * math.sqrt(P[2])) and x[0] > -drag
+    both = x[1] * x[2] > 0.0 and abs(x[2]) > max(p.both, _SURE * math.sqrt(P[2]))
+    both = both and x[0] > -max(least, _SURE * unsure)
     shakes = max(x[3], x[4]) > max(p.shakes, _SURE * m.body[2])
     m.out[8] = 1.0 if drags or both or shakes else 0.0
 

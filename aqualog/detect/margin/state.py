@@ -75,6 +75,7 @@ class FilterParams(NamedTuple):
     shakes: float = 2.0  # [-] log variance that it adds where it takes less
     both: float = 1.0  # [-] slip of the side that deviates less, where it does neither
     brave: float = 20.0 / 3.6  # [m/s] who drives into water is rarely so far beyond full aquaplaning
+    doubt: float = 0.5  # [-] of the slips of both axles, where no resistance counts: by which they may be off there
     probable: float = 0.5  # [-] probability of water from which slips count that are known roughly
     heard: float = 2e-3  # [-] probability of water from which its distances are compared
     weight: float = 0.12  # [-] of the evidence of a step: windows overlap, and tyre and road stay
@@ -90,7 +91,7 @@ class FilterParams(NamedTuple):
 class Inputs(NamedTuple):
     """Arrays (n,): speed [m/s]; acceleration that the torques make on a level dry road and resistance [m/s²]; of sides
     slip front less rear; of the rear axle left less right; traction [-]; specific force along the car [m/s²]; 1 where
-    the car speeds up, the torque jumps or a wheel transmits so much that the dry road's slip is known roughly, else 0.
+    the torque jumps or a wheel transmits so much that the dry road's slip is known roughly, else 0.
 
     NaN where a value is unknown or not to be trusted.
     """
