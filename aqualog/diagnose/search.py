@@ -124,7 +124,8 @@ def search(
 
     both: list[Callable[[], Arena]] = [look, partial(with_elements, arena)]
     arena = beside(lambda f: f(), both)[1]
-    posterior = compete(arena)
+    known = _repeated(first, compete(first, begun=begun), model)
+    posterior = compete(arena := _known_exactly(arena, known[0]))
     k = np.r_[np.arange(evidence.count), -1]
     scale = np.append(arena.sd[: evidence.count], 1.0)
     plain = posterior.gram[np.ix_(k, k)] / np.outer(scale, scale)
@@ -138,7 +139,7 @@ def search(
     tell(f"{so_far}; comparing known effects", 0.55)
     if test.p_value > level:
         return Found(test, plain, gram, calibration, arena, posterior)
-    arena, posterior = _repeated(first, compete(first, begun=begun), model)
+    arena, posterior = known
     tell(f"so far {_likeliest(arena, posterior)}; refitting in the simulator", 0.7)
     options = sorted(_refitted(evidence, arena, posterior, model), key=lambda o: -o.evidence)
     return Found(test, plain, gram, calibration, arena, posterior, (), tuple(options))
@@ -230,6 +231,15 @@ def _around(arena: Arena, found: Refit, slopes: Sequence[FloatArray], chosen: Se
         changed[columns] = own[..., p.at]
         start = found.residuals[p.drive] + np.tensordot(found.off, own, axes=1)
         parts.append(replace(p, signatures=changed, residual=start[:, p.at]))
+    return replace(arena, parts=tuple(parts))
+
+
+def _known_exactly(arena: Arena, known: Arena) -> Arena:
+    """The arena with what a competition of known effects has simulated around its best set. Else an unknown form may
+    explain what the straight line of a large delay misses."""
+    parts = []
+    for p, own in zip(arena.parts, known.parts, strict=True):
+        parts.append(replace(p, residual=own.residual, signatures=own.signatures))
     return replace(arena, parts=tuple(parts))
 
 

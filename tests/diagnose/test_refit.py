@@ -194,6 +194,25 @@ def test_the_cars_own_values_are_likeliest_within_the_tolerance_and_a_known_term
     assert kept.values["delta"] == 0.05
 
 
+def test_unknown_forms_compete_beside_a_large_delay_as_it_is_simulated(monkeypatch):
+    """The straight line of a delay of 0.3 s misses much of it, which an unknown form may explain."""
+    h = one("signal_delay", "v_x")
+    evidence, _, _ = prepared([h, one("head_wind")], term("signal_delay", "v_x", delay=0.3))
+    seen = []
+    monkeypatch.setattr(search, "compete", lambda a, **kw: seen.append(a) or compete(a, **kw))
+    found = search.search(evidence, Model(), level=0.01, surrogates=0, seed=1)
+    assert found.forms == ()
+
+    def missed(arena):
+        part, column = arena.parts[0], evidence.columns[0][0]
+        x, y = (z[part.channels.index("slip_fl"), part.mask] for z in (part.signatures[column], part.residual))
+        return 1.0 - (x @ y) ** 2 / ((x @ x) * (y @ y))
+
+    with_forms = [a for a in seen if any(b.kind == "shape" for b in a.blocks)]
+    assert len(with_forms) == 1
+    assert missed(with_forms[0]) < 0.5 * missed(seen[0])
+
+
 @pytest.mark.parametrize(("gain", "strains"), [(1.0, False), (1.02, False), (1.08, True)])
 def test_a_value_at_the_end_of_its_tolerance_is_strained_where_it_is_worth_naming(gain, strains):
     asked = [one("accelerometer_gain", "a_x"), one("tyre_radius", "rl"), one("head_wind")]
