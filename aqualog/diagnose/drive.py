@@ -36,6 +36,9 @@ A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
 A_X_MAX = 6.0  # [m/s^2]
 # [m/s^3] at steeper torque the samples show clocks, filters and tyre lag: 10 ms are 0.1 m/s^2
 JERK_MAX, JERK_S = 10.0, 0.1
+SHIFT_JERK, SHIFT_S = 2.0, 1.0  # [m/s^3] of a torque that falls away and comes back, and the most time between [s]
+SETTLES_S = 2.0  # [s] after a gear shift, until the body no longer pitches (K)
+SHIFTS_MOST = 0.3  # [-] of the drive: beyond, the torque is noisy
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
 BRAKES, LONG_AGO_S = -0.8, 60.0  # [m/s^2], [s] braking, and when it has been long ago
 WHILE_S = -15.0  # [s] in place of it while braking: far enough to act as it does after it, or not at all
@@ -163,7 +166,12 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         if unlogged:
             bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.arm("fl")
             notes.append(f"{unlogged}, driven stretches are used")
-    left_out = _widened(bad, BESIDE_S, dt) | _widened(_jerk(logged, vehicle, dt) > JERK_MAX, JERK_S, dt)
+    jerk = _jerk(logged, vehicle, dt)
+    left_out = (
+        _widened(bad, BESIDE_S, dt)
+        | _widened(np.abs(jerk) > JERK_MAX, JERK_S, dt)
+        | _shifting(_jerk(torque, vehicle, dt), dt)
+    )
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
     return Drive(
         name, dt, vehicle, course, speed, filled, channels, mask, _coordinates(filled, course, speed, v, dt), present,
@@ -283,11 +291,23 @@ def _depth(course: Course) -> FloatArray:
 
 
 def _jerk(torque: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
-    """How fast the drive's share of the acceleration changes, over 0.1 s. (n,) [m/s³]"""
+    """How fast the drive's share of the acceleration rises, over 0.1 s. (n,) [m/s³]"""
     a = torque.sum(axis=0) / (vehicle.mass * vehicle.arm("fl"))
     k = max(1, round(0.5 * JERK_S / dt))
     padded = np.pad(a, k, mode="edge")
-    return np.asarray(np.abs(padded[2 * k :] - padded[: -2 * k]) / (2 * k * dt))
+    return np.asarray((padded[2 * k :] - padded[: -2 * k]) / (2 * k * dt))
+
+
+def _shifting(jerk: FloatArray, dt: float) -> BoolArray:
+    """Where a gear is shifted, (n,): the torque falls away and comes back, and the body pitches for a second more."""
+    at = np.arange(jerk.size)
+    fell = np.maximum.accumulate(np.where(jerk < -SHIFT_JERK, at, -jerk.size))
+    back = (jerk > SHIFT_JERK) & ((at - fell) * dt < SHIFT_S)
+    ends = np.zeros(jerk.size + 1)
+    np.add.at(ends, fell[back], 1.0)
+    np.add.at(ends, np.minimum(at[back] + round(SETTLES_S / dt), jerk.size), -1.0)
+    shifting = np.cumsum(ends[:-1]) > 0.5
+    return np.asarray(shifting & (shifting.mean() < SHIFTS_MOST))
 
 
 def _widened(bad: BoolArray, by: float, dt: float) -> BoolArray:

@@ -24,7 +24,7 @@ from aqualog.diagnose.hypotheses import Hypothesis
 from aqualog.diagnose.noise import white_noise
 from aqualog.diagnose.shapes import MECHANISMS, POINTS, Basis, Mechanism, Shape
 from aqualog.diagnose.threads import beside
-from aqualog.diagnose.words import listed
+from aqualog.diagnose.words import listed, number
 from aqualog.model.effects import EFFECTS
 
 __all__ = ["EDGES", "against", "begun", "clipped", "gain_of", "intervals", "moments", "trapezoid", "with_elements"]
@@ -322,7 +322,7 @@ def _patch(
     there = np.asarray(np.mod(points - start, period) < length, dtype=np.float64)[:, None]
     basis = Basis((name,), own[:, None], np.eye(1), points[:, None], there, np.ones(points.size, dtype=bool))
     unit = "m" if name == "position" else "s"
-    return _Found("patches", f"for {length:.2g} {unit} in every {period:.3g} {unit}", basis, count)
+    return _Found("patches", f"for {number(length)} {unit} in every {number(period)} {unit}", basis, count)
 
 
 def _waves(
@@ -352,7 +352,7 @@ def _waves(
         at_points = _circle(2.0 * np.pi * f * points).T
         basis = Basis((name,), columns, np.eye(2), grid, at_points, np.ones(points.size, dtype=bool))
         unit = "m" if name == "position" else "s"
-        manner = f"in waves of {span / f:.3g} {unit}" if f >= 1.0 else ""
+        manner = f"in waves of {number(span / f)} {unit}" if f >= 1.0 else ""
         out.append(_Found("wave", manner, basis, (most - LEAST_PERIODS) / STEP))
     return out
 

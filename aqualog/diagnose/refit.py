@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from aqualog.core.errors import ConfigError
+from aqualog.core.notation import AXLES, SIDES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.arena import CHUNK, Arena, Part, products
 from aqualog.diagnose.evidence import FARTHEST, Evidence
@@ -158,13 +159,13 @@ def likeliest(evidence: Evidence, measure: Metric, residuals: Sequence[FloatArra
 
 
 def strained(evidence: Evidence, model: Model, settled: Model) -> tuple[Term, ...]:
-    """Effects worth naming whose values `likeliest` has moved from a model as far as a tolerance goes: there a fault
-    is as likely as an error of the file."""
+    """Effects of sensors worth naming whose values `likeliest` has moved from a model as far as a tolerance goes: there
+    a fault is as likely. Values of car and tyres at that end are nothing that can be checked."""
     out = []
     new = {(t.effect.name, t.place): t for t in settled.terms if t not in model.terms}
     for h, columns in zip(evidence.asked, evidence.columns, strict=True):
         term = new.get((h.effect.name, h.where or h.effect.default))
-        if h.allowed or term is None:
+        if term is None or h.where is None or h.where in (*WHEELS, *AXLES, *SIDES):
             continue
         each = [(n, abs(term.values[n] - value_in(model, h, n)), c) for n, c in zip(h.free, columns, strict=True)]
         if any(x > END * FARTHEST * evidence.forgiven[c] and x >= h.worth_naming(n) for n, x, c in each):

@@ -152,9 +152,10 @@ def _diagnosed(
         moved=in_words(bare.terms[len(known.terms) :], evidence.asked, known, vehicle),
         unjudged=[n for d in ready for n in d.notes if ON_WATER in n],
     )  # fmt: skip
+    strain = _strained(found, evidence, extended, settled, vehicle)
     return Diagnosis(
         verdict=outcome.verdict,
-        sentence=sentence,
+        sentence=f"{sentence} {strain}".strip() if outcome.verdict == "no_effect" else sentence,
         drives=tuple(d.name for d in ready),
         duration_s=sum(d.duration_s for d in ready),
         used_s=sum(d.used_s for d in ready),
@@ -174,7 +175,7 @@ def _diagnosed(
             *notes,
             *outcome.notes,
             *seen.notes,
-            *_strained(found, evidence, extended, settled, vehicle),
+            *([strain] if strain and outcome.verdict != "no_effect" else ()),
             *((_SHARED,) if any(c.drives for c in outcome.causes) else ()),
         ),
         views=_views(ready, before, after, {n for c in outcome.causes for n in c.drives}) if options.views else (),
@@ -183,15 +184,15 @@ def _diagnosed(
     )
 
 
-def _strained(found: Found, evidence: Evidence, extended: Model, settled: Model, vehicle: Vehicle) -> tuple[str, ...]:
-    """A note on what is as far from the file as a tolerance goes, and is not named."""
+def _strained(found: Found, evidence: Evidence, extended: Model, settled: Model, vehicle: Vehicle) -> str:
+    """What is as far from no effect as a tolerance goes, and is not named; empty without."""
     if settled == extended:  # nothing is named: not looked for yet
         settled = likeliest(evidence, metric(found.arena, found.posterior.weighings), evidence.residuals, extended)
     each = strained(evidence, extended, settled)
     if not each:
-        return ()
+        return ""
     said = listed(in_words(each, evidence.asked, extended, vehicle))
-    return (f"Not named, but at the end of what is tolerated: {said}. Check {'it' if len(each) == 1 else 'them'}.",)
+    return f"Not named, but at the end of what is tolerated: {said}. Check {'it' if len(each) == 1 else 'them'}."
 
 
 def _simulated(
@@ -315,7 +316,7 @@ def _road(drive: Drive, model: Model, name: str) -> Profile | None:
 def _with_road(outcome: Outcome[Option], road: Profile) -> Outcome[Option]:
     cause = road.cause
     if road.rms.value < HILLY or cause.probability < SURE:
-        small = "Significant, but too small to be worth naming"
+        small = f"Significant, but below {HILLY:.0%} rms, from which a road is named"
         why = f"Probability {cause.probability:.2f}, not named" if cause.probability < SURE else small
         return outcome._replace(notes=(*outcome.notes, f"{why}: {cause.sentence}"))
     if outcome.verdict != "cannot_tell" or cause.effect in outcome.certain:

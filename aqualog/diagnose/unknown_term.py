@@ -81,7 +81,7 @@ LEAST_ALIKE = 0.5  # and from which it is named at all
 
 
 def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = ()) -> str:
-    """Sentences: mechanism and coordinate, its largest value, coordinates and mechanisms that explain it as well,
+    """Sentences: mechanism and coordinate, its surest value, coordinates and mechanisms that explain it as well,
     similar effects."""
     title = _CHANNELS.get(r.channel) or (CHANNELS[r.channel].title if r.channel in CHANNELS else r.channel)
     title = f"{title[:1].lower()}{title[1:]}"
@@ -90,7 +90,8 @@ def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = 
     text += f"; {r.share:.0%} of the variance of the {title}"
     sure = np.isfinite(r.high) & ((r.low > 0.0) | (r.high < 0.0))  # a band without an end says no size
     if sure.any():
-        at = int(np.argmax(np.where(sure, np.abs(r.f), -1.0)))
+        # the largest one may stand at an end, where hardly anybody drove
+        at = int(np.argmax(np.where(sure, np.abs(r.f) / (r.high - r.low), -1.0)))
         near = [_place(v, x) for v, x in zip(r.x[at].tolist(), r.x.T, strict=True)]
         there = ", ".join(f"{v} {COORDINATES[n].unit}" for n, v in zip(r.depends_on, near, strict=True))
         text += f"; {_size(mechanism, float(r.f[at]))} at {there}"

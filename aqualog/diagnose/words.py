@@ -13,8 +13,8 @@ from aqualog.diagnose.records import SURE, Cause, Estimate
 from aqualog.model.term import Effect, Term
 
 __all__ = [
-    "CERTAIN", "PLACES", "cause_sentence", "change_words", "listed", "name_of", "place", "quantity", "term_words",
-    "verdict_sentence",
+    "CERTAIN", "PLACES", "cause_sentence", "change_words", "listed", "name_of", "number", "place", "quantity",
+    "term_words", "verdict_sentence",
 ]  # fmt: skip
 
 MANY_UNTESTED = 5  # more than those of water, which no dry road shows
@@ -32,10 +32,15 @@ def place(where: str | None) -> str:
     return "" if where is None else f" ({PLACES.get(where, where)})"
 
 
+def number(value: float, sign: str = "") -> str:
+    """`1160`: three digits, large ones without an exponent."""
+    text = f"{value:{sign}.3g}"
+    return f"{float(text):{sign}.0f}" if "e+" in text and abs(value) < 1e6 else text
+
+
 def quantity(value: float, unit: str, *, change: bool = False) -> str:
     """A value with three digits and its unit; ratios without one."""
-    sign = "+" if change else ""
-    text = f"{value:{sign}.3g}"
+    text = number(value, "+" if change else "")
     return text if unit == "-" else f"{text} {displayed_unit(unit)}"
 
 

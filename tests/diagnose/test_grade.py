@@ -108,7 +108,7 @@ def test_a_road_too_small_to_be_named_is_a_note(hilly):
     small = replace(found, rms=Estimate(0.0099, 0.009, 0.011, "rad"))
     silent = run._with_road(Outcome("no_effect", ()), small)
     assert (silent.verdict, silent.causes) == ("no_effect", ())
-    assert "too small to be worth naming" in silent.notes[0]
+    assert "below 1% rms, from which a road is named" in silent.notes[0]
     assert run._with_road(Outcome("no_effect", ()), found).verdict == "named"
 
 

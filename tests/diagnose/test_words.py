@@ -8,7 +8,7 @@ import pytest
 from aqualog.diagnose.records import Estimate, Remainder
 from aqualog.diagnose.shapes import MECHANISMS
 from aqualog.diagnose.unknown_term import describe
-from aqualog.diagnose.words import cause_sentence, change_words, verdict_sentence
+from aqualog.diagnose.words import cause_sentence, change_words, number, verdict_sentence
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Term
 
@@ -106,6 +106,22 @@ def test_a_place_has_the_digits_of_its_points(cosine, last):
     assert "; +46.8% at 970 N·m)" in text
     assert "goes with its own size (" in text
     assert text.endswith(last)
+
+
+def test_the_size_is_the_surest_one_and_not_that_of_an_end_where_nobody_drove():
+    x, f = np.array([[-460.0], [200.0], [1360.0]]), np.array([40.0, 35.0, 1160.0])
+    half = np.array([35.0, 10.0, 1100.0])
+    mechanism = next(m for m in MECHANISMS if m.name == "force")
+    r = Remainder("force_balance", ("torque",), 0.58, math.nan, x, f, f - half, f + half, (), None, 0.0, "", "force", "N",
+                  0.75)  # fmt: skip
+    assert "; 35 N against the motion at " in describe(mechanism, r)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(1163.0, "1160"), (-212.4, "-212"), (0.000123, "0.000123"), (3.2e8, "3.2e+08")]
+)
+def test_large_numbers_have_no_exponent(value, text):
+    assert number(value) == text
 
 
 def test_a_change_is_from_the_known_value_in_standard_deviations():
