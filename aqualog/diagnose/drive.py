@@ -62,7 +62,8 @@ class Drive:
     """One drive: `course` for the simulation, `columns` measured (n,), `mask` (m,) of usable blocks of 0.1 s. `speed`
     (n,) is the measured speed without noise [m/s]; that of the course leads it by the lag of the simulation.
     `coordinates` (m,): quantities that a remaining error may depend on. `untorqued`: the log has no torque, the one
-    that the base model needs for the measured speed replaces it, and the force balance is not judged."""
+    that the base model needs for the measured speed replaces it, and the force balance is not judged. `settling` (m,):
+    blocks in and behind a gear shift: they show a road, but no effect (`calm`)."""
 
     name: str
     dt: float
@@ -72,6 +73,7 @@ class Drive:
     columns: Mapping[str, FloatArray]
     channels: tuple[str, ...]
     mask: BoolArray
+    settling: BoolArray
     coordinates: Mapping[str, FloatArray]
     present: frozenset[str]
     untorqued: bool
@@ -166,17 +168,19 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         if unlogged:
             bad |= torque.sum(axis=0) < FORCE_MIN * vehicle.mass * vehicle.arm("fl")
             notes.append(f"{unlogged}, driven stretches are used")
-    jerk = _jerk(logged, vehicle, dt)
-    left_out = (
-        _widened(bad, BESIDE_S, dt)
-        | _widened(np.abs(jerk) > JERK_MAX, JERK_S, dt)
-        | _shifting(_jerk(torque, vehicle, dt), dt)
-    )
+    left_out = _widened(bad, BESIDE_S, dt) | _widened(np.abs(_jerk(logged, vehicle, dt)) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
+    settling = block_means(_shifting(_jerk(torque, vehicle, dt), dt).astype(np.float64), dt) > 0.0
     return Drive(
-        name, dt, vehicle, course, speed, filled, channels, mask, _coordinates(filled, course, speed, v, dt), present,
-        not torqued, n * dt, (*notes, *_judged_on_water(mask, course, dt)),
+        name, dt, vehicle, course, speed, filled, channels, mask, mask & settling,
+        _coordinates(filled, course, speed, v, dt), present, not torqued, n * dt,
+        (*notes, *_judged_on_water(mask, course, dt)),
     )  # fmt: skip
+
+
+def calm(drive: Drive) -> Drive:
+    """The drive without gear shifts and what swings behind them."""
+    return replace(drive, mask=drive.mask & ~drive.settling)
 
 
 def _judged_on_water(mask: BoolArray, course: Course, dt: float) -> list[str]:
@@ -198,8 +202,8 @@ def led_by(drive: Drive, model: Model) -> Drive:
 def rolling_under(drive: Drive, model: Model) -> Drive:
     """The drive without what is left out where a wheel floats in the simulation of a model."""
     floats = floating({}, drive.speed, drive.vehicle, drive.course, (model,))
-    left_out = _widened(floats, BESIDE_S, drive.dt).astype(np.float64)
-    return replace(drive, mask=drive.mask & (block_means(left_out, drive.dt) == 0.0))
+    rolls = block_means(_widened(floats, BESIDE_S, drive.dt).astype(np.float64), drive.dt) == 0.0
+    return replace(drive, mask=drive.mask & rolls, settling=drive.settling & rolls)
 
 
 def _slides(led: Mapping[str, FloatArray], vehicle: Vehicle) -> BoolArray:

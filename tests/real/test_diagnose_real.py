@@ -132,7 +132,7 @@ def test_delay_of_the_loaded_trip_is_the_torques(real_logs, bmw, loaded):
     assert all(d.low < late < d.high for d in delays)
     (limit,) = (x for x in loaded.limits if (x.effect, x.where) == ("signal_delay", "torque"))
     assert delays or late < limit.size  # a single trip shows it hardly
-    assert any("too small to be worth naming: The road" in n for n in loaded.notes)
+    assert any("from which a road is named: The road" in n for n in loaded.notes)
 
 
 def test_wind_of_the_loaded_trip_is_what_it_slows_the_car_down_by(real_logs, bmw, loaded):
