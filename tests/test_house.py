@@ -12,9 +12,9 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 97_247
+MOST_LINES = 97_251
 MOST_FILES = 502
-MOST_TEST_LINES = 72_114
+MOST_TEST_LINES = 72_133
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100

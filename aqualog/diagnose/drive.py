@@ -303,7 +303,10 @@ def _jerk(torque: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
 
 
 def _shifting(jerk: FloatArray, dt: float) -> BoolArray:
-    """Where a gear is shifted, (n,): the torque falls away and comes back, and the body pitches for a second more."""
+    """Where a gear is shifted, (n,): the torque falls away and comes back, and body and driveline swing for a while.
+
+    `jerk` (n,) as of `_jerk`, positive where the torque drives more. [m/s³]
+    """
     at = np.arange(jerk.size)
     fell = np.maximum.accumulate(np.where(jerk < -SHIFT_JERK, at, -jerk.size))
     back = (jerk > SHIFT_JERK) & ((at - fell) * dt < SHIFT_S)

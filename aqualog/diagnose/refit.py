@@ -170,9 +170,10 @@ def strained(evidence: Evidence, model: Model, settled: Model) -> tuple[Term, ..
         each = [(n, abs(term.values[n] - value_in(model, h, n)), c) for n, c in zip(h.free, columns, strict=True)]
         if any(x > END * FARTHEST * evidence.forgiven[c] and x >= h.worth_naming(n) for n, x, c in each):
             out.append(term)
-    # several delays at once are that of another signal, such as a wheel speed that is the mean of its last interval
+    # several delays of one sign are that of another signal, such as a wheel speed that is the mean of its last interval
     late = [t for t in out if t.effect.name == "signal_delay"]
-    return tuple(t for t in out if len(late) < 2 or t not in late)
+    is_shared = len(late) > 1 and len({t.values["delay"] > 0.0 for t in late}) == 1
+    return tuple(t for t in out if not is_shared or t not in late)
 
 
 def refit(evidence: Evidence, chosen: Sequence[int], start: FloatArray, measure: Metric, model: Model) -> Refit | None:

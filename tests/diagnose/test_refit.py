@@ -231,7 +231,7 @@ def test_a_value_at_the_end_of_its_tolerance_is_strained_where_it_is_worth_namin
 def test_several_delays_at_the_end_of_their_tolerance_are_that_of_another_signal():
     late = [one("signal_delay", w) for w in ("v_x", "a_x")]
     evidence, _, _ = prepared([*late, one("head_wind")])
-    for delays, found in (((-0.02, 0.0), ["v_x"]), ((-0.02, -0.02), [])):
+    for delays, found in (((-0.02, 0.0), ["v_x"]), ((-0.02, -0.02), []), ((0.02, -0.02), ["v_x", "a_x"])):
         terms = [term("signal_delay", h.where, delay=d) for h, d in zip(late, delays, strict=True)]
         assert [t.where for t in strained(evidence, Model(), Model(tuple(terms)))] == found
 

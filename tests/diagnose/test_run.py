@@ -70,6 +70,25 @@ def test_the_first_sentence_says_how_many_drives_it_stands_on(monkeypatch):
     assert any("left out: " in n for n in d.notes)
 
 
+def test_a_gear_shift_is_not_compared():
+    log = noisy()
+    t = np.arange(log.frame.height) * log.dt
+    gap = pl.Series(np.interp(t, [30.0, 30.15, 30.4, 30.55], [0.0, 1.0, 1.0, 0.0]))
+    less = [(pl.col(f"torque_{w}") - 0.15 * CAR.mass * CAR.r_e_r * gap).alias(f"torque_{w}") for w in WHEELS]
+    shifted = changed(log, log.frame.with_columns(*less, pl.col("a_x") - 0.6 * gap))
+    assert 2.0 < told(log=log).used_s - told(log=shifted).used_s < 3.5
+
+
+def test_a_sensor_at_the_end_of_its_tolerance_is_in_the_sentence_of_no_effect(monkeypatch):
+    ask(monkeypatch, ("accelerometer_gain@a_x", "head_wind"))
+    d = told(term("accelerometer_gain", "a_x", gain=1.06))
+    assert d.verdict == "no_effect"
+    assert d.sentence.endswith(
+        "at the end of what is tolerated: accelerometer gain (longitudinal) 4% larger. Check it."
+    )
+    assert "tolerated" not in told().sentence
+
+
 def test_no_effect():
     d, _ = watched()
     assert d.verdict == "no_effect"
