@@ -151,7 +151,9 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             own = AXLES.get(where or "", WHEELS if where is None else (where,))
             most = math.inf if set(own) <= {*drives[0].vehicle.driving} else effect.drive.most_free
             out += [Hypothesis(effect, where, free, fixed, room, n, most) for n in ("", *alone) for fixed in variants]
-    out += [Hypothesis(e, None, ("by",)) for e in (*TOLERANCES, *(() if torque else (STAND_IN,)))]
+    driven = [a for a, own in AXLES.items() if torque and {*own} & {*drives[0].vehicle.driving}]
+    has_it = [(e, w) for e in TOLERANCES for w in (driven if e.places else (None,))]
+    out += [Hypothesis(e, w, ("by",)) for e, w in (*has_it, *(() if torque else ((STAND_IN, None),)))]
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
     # without torque there is no drag to test, nor one that differs
     asked_at = {(h.effect.name, h.where) for h in out}

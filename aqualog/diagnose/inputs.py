@@ -36,6 +36,7 @@ STANDS_OUT, LEAST_EVENT = 4.0, 10.0  # standard deviations, and [N m] of an axle
 BESIDE_EVENT_S = 0.5  # [s]
 SEGMENT_S, NEIGHBOURS = 12.8, 0.3  # stretches whose spectra are averaged, and share of a frequency to either side
 SURE_HZ = (0.05, 0.3)  # drivers act there: whatever a torque has there is torque
+JUMP_S, JUMPS = 1.0, 25.0  # [s] over which what stands out of a torque is judged, and by how much it must (D)
 LATEST_S = 0.3  # that a torque is early or late
 SURELY = 2.0  # standard deviations by which a share may be overestimated
 WITHIN = (0.5, 1.5)  # of the expected acceleration per torque, which the car must show for the comparison
@@ -167,7 +168,16 @@ def confirmed_torque(torque: FloatArray, a: FloatArray, dt: float, per_torque: f
     line = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * np.linspace(0.0, 1.0, n)
     mirrored = np.concatenate([torque - line, (line - torque)[:, ::-1]], axis=1)
     weights = np.interp(np.fft.rfftfreq(2 * n, dt), f, share)
-    return np.asarray(line + np.fft.irfft(np.fft.rfft(mirrored, axis=1) * weights, 2 * n, axis=1)[:, :n])
+    sure = line + np.fft.irfft(np.fft.rfft(mirrored, axis=1) * weights, 2 * n, axis=1)[:, :n]
+    return np.asarray(sure + _stands_out((torque - sure).sum(axis=0), dt) * (torque - sure))
+
+
+def _stands_out(x: FloatArray, dt: float) -> FloatArray:
+    """The weight of Wiener's filter [wiener1949] of what is left of a torque, by its own power around each sample: a
+    jump, which no filter of frequencies follows, is not noise. (n,)"""
+    local = smooth(x * x, dt, JUMP_S)
+    noise = float(np.median(local))
+    return np.maximum(1.0 - JUMPS * noise / np.maximum(local, 1e-300), 0.0)
 
 
 def _neighbours(x: NDArray[np.complex128] | FloatArray) -> tuple[NDArray[np.intp], NDArray[np.complex128]]:

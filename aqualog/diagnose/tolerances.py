@@ -1,6 +1,7 @@
 """Quantities that no vehicle file or simulator has exactly: taken into account, but never reported as causes. Each has
 the form of an effect. `friction` is mostly the curvature of a tyre's curve well below its peak: laws go from a parabola
-to a straight line. `radius_loss`: wheels that carry more roll on less radius, in curves the outer ones.
+to a straight line. `radius_loss`: wheels that carry more roll on less radius, in curves the outer ones. `preload` and
+`locking`: a differential brakes the outer wheel and drives the inner one, which looks like another slip of both.
 `antenna_height`: a car pitches by 0.01 rad per m/s² at the most, 1 m below an antenna on its roof (K)."""
 
 from __future__ import annotations
@@ -8,6 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import numpy as np
+
+from aqualog.core.notation import AXLES, WHEELS
 from aqualog.model.plant import Plant
 from aqualog.model.sensors import Channel
 from aqualog.model.term import Effect, Parameter, Setup
@@ -30,9 +34,17 @@ def _channel(signal: str, change: Callable[[Channel, float], Channel]) -> _Apply
     return apply
 
 
-def _of(name: str, what: str, unit: str, sd: float, apply: _Apply) -> Effect:
+def _of(name: str, what: str, unit: str, sd: float, apply: _Apply, places: tuple[str, ...] = ()) -> Effect:
     by = Parameter("by", unit, 0.0, sd, -20.0 * sd, 20.0 * sd, sd, "deviation; sigma is the tolerance (K)")
-    return Effect(name, what, "", "general knowledge", (by,), apply)
+    return Effect(name, what, "", "general knowledge", (by,), apply, places)
+
+
+def _at_axles(name: str) -> _Apply:
+    def apply(setup: Setup, v: Mapping[str, float], where: str | None) -> Setup:
+        at = np.isin(WHEELS, AXLES[where] if where else WHEELS)
+        return setup._replace(plant=setup.plant._replace(**{name: getattr(setup.plant, name) + v["by"] * at}))
+
+    return apply
 
 
 TOLERANCES: tuple[Effect, ...] = (
@@ -61,6 +73,9 @@ TOLERANCES: tuple[Effect, ...] = (
         _channel("yaw_rate", lambda c, x: replace(c, bias=c.bias + x))),
     _of("gyro_gain", "gain of the yaw rate, relative", "-", 0.02,
         _channel("yaw_rate", lambda c, x: replace(c, gain=c.gain * (1.0 + x)))),
+    # the file has none, and an open differential up to twice these
+    _of("preload", "friction of an axle's differential", "N*m", 15.0, _at_axles("preload"), tuple(AXLES)),
+    _of("locking", "the same, over the torque of a wheel", "-", 0.06, _at_axles("locking"), tuple(AXLES)),
 )  # fmt: skip
 
 # the torque that the model needs on a flat road, in place of a missing one: load, wind and slopes are not in it

@@ -51,7 +51,19 @@ from aqualog.model.state import (
     V_Y,
     YAW_RATE,
 )
-from aqualog.physics import contact, hydroplaning, kinematics, load, rolling, slip, steering, surface, tyre_brush, water
+from aqualog.physics import (
+    contact,
+    driveline,
+    hydroplaning,
+    kinematics,
+    load,
+    rolling,
+    slip,
+    steering,
+    surface,
+    tyre_brush,
+    water,
+)
 from aqualog.physics.hydroplaning import WaterLaw
 from aqualog.physics.resistance import rolling_resistance_force
 
@@ -79,6 +91,7 @@ _effective_radius = inlined(rolling.effective_radius)
 _pressed_radius = inlined(rolling.pressed_radius)
 _load_factor = inlined(rolling.load_factor)
 _carcass_torque = inlined(rolling.carcass_torque)
+_differential_friction = inlined(driveline.differential_friction)
 _hop = inlined(load.hop)
 _HOP_MASS, _HOP_STIFFNESS, _HOP_DAMPING = load.HOP
 _SPIN_UP_RATIO = float(hydroplaning.SPIN_UP_RATIO)
@@ -378,6 +391,8 @@ def _balance(i, roll, ground, wet, command, m, p, q):  # type: ignore[no-untyped
     share = 1.0 - command.split_rear if front else command.split_rear
     torque = 0.5 * share * command.drive + (0.5 if front else -0.5) * command.excitation * roll.r_e
     torque += m.applied[i] * p.torque_gain
+    if q.preload != 0.0 or q.locking != 0.0:
+        torque -= _differential_friction(m.y[OMEGA + i] - m.y[OMEGA + (i ^ 1)], torque, q.preload, q.locking)
     braking = q.brake_split * command.brake * (1.0 - m.released[i])
     water_torque = wet.film_force * roll.r_e + wet.shift
     resisting = _rolling_force(ground.F_z, ground.r_w) * roll.r_e + water_torque + q.brake_drag

@@ -128,6 +128,18 @@ def test_fast_torque_that_moves_the_car_stays():
     assert (out - real)[500:-500].std() < 0.05 * 300.0
 
 
+def test_a_gear_shift_is_no_noise():
+    """The spectra of the whole drive do not know that its torque is fast in one place; around it the rest is quiet."""
+    slow, false = coloured(8, 0.03, 0.2, 300.0), coloured(9, 1.0, 3.0, 5.0)
+    gap = np.interp(LONG, [80.0, 80.15, 80.4, 80.55], [0.0, 1.0, 1.0, 0.0]) - np.clip((LONG - 120.0) / 0.2, 0.0, 1.0)
+    real = slow - 600.0 * gap
+    moves = real * PER_TORQUE + np.random.default_rng(10).normal(0.0, 0.02, real.size)
+    out = confirmed_torque(wheels(real + false), moves, DT, PER_TORQUE).sum(axis=0)
+    for at in (80.0, 120.0):
+        assert np.abs(out - real)[(at - 1.5 < LONG) & (at + 1.5 > LONG)].max() < 30.0
+    assert (out - real)[500:-500].std() < 0.8 * 5.0
+
+
 def test_a_drive_that_shows_nothing_of_it_leaves_the_torque_alone():
     torque = wheels(coloured(6, 0.03, 3.0, 30.0))
     assert confirmed_torque(torque, np.zeros(LONG.size), DT, PER_TORQUE) is torque

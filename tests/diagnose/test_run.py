@@ -17,8 +17,9 @@ from aqualog.diagnose import arena, run, search
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
+from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model.scenario import Steering
-from aqualog.model.term import Model
+from aqualog.model.term import Model, Term
 from tests.blind.world.cases import CARS, Hidden, Spec, clean_rows, make_case, world_of
 from tests.diagnose.test_drive import CAR, NOISY, changed, plain, signals, term
 
@@ -70,13 +71,18 @@ def test_the_first_sentence_says_how_many_drives_it_stands_on(monkeypatch):
     assert any("left out: " in n for n in d.notes)
 
 
-def test_a_gear_shift_is_not_compared():
-    log = noisy()
-    t = np.arange(log.frame.height) * log.dt
-    gap = pl.Series(np.interp(t, [30.0, 30.15, 30.4, 30.55], [0.0, 1.0, 1.0, 0.0]))
-    less = [(pl.col(f"torque_{w}") - 0.15 * CAR.mass * CAR.r_e_r * gap).alias(f"torque_{w}") for w in WHEELS]
-    shifted = changed(log, log.frame.with_columns(*less, pl.col("a_x") - 0.6 * gap))
-    assert 2.0 < told(log=log).used_s - told(log=shifted).used_s < 3.5
+def test_the_friction_of_a_differential_is_no_effect(monkeypatch):
+    """In curves it brakes the outer wheel and drives the inner one, which a log of the axle's torque does not show."""
+    ask(
+        monkeypatch,
+        [f"{e}@{w}" for e in ("brake_drag", "load_sensitivity", "slip_stiffness") for w in (*WHEELS, *AXLES)],
+    )
+    car = replace(CAR, drivetrain="fwd")
+    preload = next(e for e in TOLERANCES if e.name == "preload")
+    log = noisy(Term(preload, {"by": 25.0}, "f"), vehicle=car, steering=Steering(0.016, 14.0, 5.0), seed=3)
+    d = diagnose([("a", log)], car, options=QUICK)
+    assert (d.verdict, d.causes) == ("no_effect", ())
+    assert d.significance.p_value > 0.5
 
 
 def test_a_sensor_at_the_end_of_its_tolerance_is_in_the_sentence_of_no_effect(monkeypatch):

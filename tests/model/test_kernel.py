@@ -9,6 +9,7 @@ import pytest
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import Vehicle
+from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model import kernel, state
 from aqualog.model.effects import EFFECTS
 from aqualog.model.plant import build_plant, flat
@@ -24,6 +25,7 @@ from tests.thesis.passes import SEDAN, resistance, slip_and_traction
 FWD = Vehicle(name="fwd", drivetrain="fwd", torque_split_rear=0.0, given=frozenset({"drivetrain", "mass"}))
 AWD = Vehicle(name="awd", drivetrain="awd", torque_split_rear=0.6, given=frozenset({"drivetrain", "mass"}))
 CARS = {"rwd": SEDAN, "fwd": FWD, "awd": AWD}
+DIFFERENTIAL = [e for e in TOLERANCES if e.name in ("preload", "locking")]
 RAMP = ((0.0, 60 / 3.6), (20.0, 130 / 3.6))
 
 
@@ -93,6 +95,21 @@ def test_a_driveline_slows_both_wheels_of_an_axle_down_and_one_alone_by_half():
     assert other < 0.0 < one
     assert 1.2 * one + (one + other) == pytest.approx(12.0)  # torque on the left wheel: itself and a quarter of J
     assert 1.2 * other + (one + other) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_friction_of_a_differential_moves_torque_to_the_inner_wheel_of_its_axle():
+    """By hand: 20 N·m and 5 % of the wheel's torque, from the wheel that turns faster to the other one."""
+    curve = scenario(FWD, speed=((0.0, 15.0),), duration_s=12.0, steering=Steering(0.04, 2.0, 2.0, "hold"))
+    preload, locking = (Term(e, {"by": by}, "f") for e, by in zip(DIFFERENTIAL, (20.0, 0.05), strict=True))
+    (_, open_), (_, stiff) = (truth(curve, m) for m in (Model(), Model((preload, locking))))
+    at = -500  # of 1 ms: a circle to the left
+    assert stiff["omega_fr"][at] > stiff["omega_fl"][at] + 0.5
+    half = 0.5 * (stiff["torque_fl"][at] + stiff["torque_fr"][at])
+    moved = (20.0 + 0.05 * half) * np.tanh((stiff["omega_fr"][at] - stiff["omega_fl"][at]) / 0.5)
+    assert stiff["torque_fl"][at] - half == pytest.approx(moved, rel=0.05)
+    assert stiff["torque_fr"][at] - half == pytest.approx(-moved, rel=0.05)
+    assert (stiff["torque_rl"][at], stiff["torque_rr"][at]) == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert open_["torque_fl"][at] == pytest.approx(open_["torque_fr"][at])
 
 
 def test_dry_resistance_measure_does_not_see_a_grade():
