@@ -71,6 +71,7 @@ class _OfWheels(NamedTuple):
 
 _WHEEL_WORDS = ("wheel", "whl", "rad", "radgeschw", "radgeschwindigkeit", "raddrehzahl", "wss", "ws", "omega", "wspd")
 _TORQUE_WORDS = ("torque", "trq", "moment", "tq")
+_AXLE_WORDS = (*_TORQUE_WORDS, "achsmoment")
 _SIDES = {"fl": ("left", "links", "l", "li"), "fr": ("right", "rechts", "r", "re")}
 _OF_WHEELS = (
     _OfWheels("omega", _WHEEL_WORDS, ("speed", "angular_speed"), _POSITIONS),
@@ -84,9 +85,9 @@ _SEEN = 5000  # samples that are looked at for their number of values
 _LANE_WORDS = ("nass", "nassbahn", "wet", "on water", "onwater", "lichtschranke", "light barrier")
 _LANE_FLAGS = {"flag", "state", "status", "sensor", "valid"}  # of a state these words may be the name
 _PLACES = (
-    _Rule("latitude", ("latitude", "lat"), ("", "angle"), (), ("lateral", "acc"), "deg"),
-    _Rule("longitude", ("longitude", "lon", "lng"), ("", "angle"), (), ("longitudinal", "acc"), "deg"),
-    _Rule("altitude", ("altitude", "elevation", "height", "alt"), ("length", ""), (), ("cam", "ride"), "m"),
+    _Rule("latitude", ("latitude", "lat", "breitengrad"), ("", "angle"), (), ("lateral", "acc"), "deg"),
+    _Rule("longitude", ("longitude", "lon", "lng", "laengengrad"), ("", "angle"), (), ("longitudinal", "acc"), "deg"),
+    _Rule("altitude", ("altitude", "elevation", "height", "alt", "hoehe"), ("length", ""), (), ("cam", "ride"), "m"),
 )  # fmt: skip
 _SPEED = _Rule(
     "v_x", ("speed", "velocity", "vel", "geschw", "geschwindigkeit", "v", "vx", "spd"), ("speed",),
@@ -109,11 +110,11 @@ _RULES = (
           ("angle",), ("angle", "winkel", "pos", "wheel"), ("rate", "speed", "torque", "spd", "fraction")),
     _Rule("brake_pressure", ("brake", "brk", "brems", "bremse", "bremsdruck"), ("pressure",),
           ("pressure", "press", "druck"), ("pressed", "pedal", "switch", "sw"), may_rest=True),
-    _Rule("torque_f", _TORQUE_WORDS, ("torque",), ("axle", "achsmoment"), ("rear", "hinten", "steer", "motor")),
-    _Rule("torque_r", _TORQUE_WORDS, ("torque",), ("axle", "achsmoment"), ("front", "vorne", "steer", "motor")),
+    _Rule("torque_f", _AXLE_WORDS, ("torque",), ("axle", "achsmoment"), ("rear", "hinten", "steer", "motor")),
+    _Rule("torque_r", _AXLE_WORDS, ("torque",), ("axle", "achsmoment"), ("front", "vorne", "steer", "motor")),
     _Rule("gear", ("gear", "gang"), ("", "ratio"), ("actual", "current")),
-    _Rule("ambient_temperature", ("ambient", "outside", "aussen", "outdoor"), ("temperature",),
-          ("temp", "temperature", "temperatur")),
+    _Rule("ambient_temperature", ("ambient", "amb", "outside", "aussen", "aussentemperatur", "outdoor"),
+          ("temperature",), ("temp", "temperature", "temperatur")),
 )  # fmt: skip
 """In the order in which they are looked for: what is found is what later ones are held against."""
 
@@ -177,7 +178,7 @@ def propose_map(
     for rule in _RULES:
         candidates = [p for c in usable if (p := _candidate(rule, c, usable)) is not None]
         if rule.symbol in ("torque_f", "torque_r"):
-            want = {"torque_f": ("front", "vorne", "va"), "torque_r": ("rear", "hinten", "ha")}[rule.symbol]
+            want = {"torque_f": ("front", "frnt", "vorne", "va"), "torque_r": ("rear", "hinten", "ha")}[rule.symbol]
             candidates = [p for p in candidates if set(words_of(p.entry.channel[0])) & set(want)]
         check = CHECKS.get(rule.symbol)
         if motion is not None and check is not None:

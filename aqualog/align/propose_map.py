@@ -205,7 +205,7 @@ def _speed_hint(unmapped: Sequence[str]) -> str:
     speeds, bare = [], []
     for name, dimension in _dimensions(unmapped):
         words = set(words_of(name.partition(" [")[0]))
-        if not {"speed", "velocity"} & words or (_NO_ROAD_SPEED | NOT_A_VALUE) & words:
+        if not {"speed", "velocity", "spd", "geschwindigkeit"} & words or (_NO_ROAD_SPEED | NOT_A_VALUE) & words:
             continue
         if dimension == "speed":
             speeds.append(name)

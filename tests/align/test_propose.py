@@ -28,3 +28,15 @@ def test_the_signal_is_found_among_thousands_that_could_be_it():
     found = propose_map([*many, channel("x.omega_fl", "rad/s")])
     assert found["omega_fl"].entry.channel == ("x.omega_fl",)
     assert found["omega_fl"].reason == "its canonical name"
+
+
+def test_names_of_buses_and_german_ones():
+    names = {
+        "torque_f": ("FrntAxleTq", "N*m"), "torque_r": ("RearAxleTq", "N*m"), "ambient_temperature": ("AmbTemp", "degC"),
+        "latitude": ("Breitengrad", "deg"), "longitude": ("Laengengrad", "deg"), "altitude": ("Hoehe", "m"),
+    }  # fmt: skip
+    found = propose_map([channel(n, u) for n, u in names.values()])
+    assert {s: p.entry.channel for s, p in found.items()} == {s: (n,) for s, (n, _) in names.items()}
+    german = {"torque_f": "Achsmoment_VA", "torque_r": "Achsmoment_HA"}
+    found = propose_map([channel(n, "N*m") for n in german.values()])
+    assert {s: p.entry.channel for s, p in found.items()} == {s: (n,) for s, n in german.items()}
