@@ -36,6 +36,9 @@ A_Y_MAX = 4.0  # [m/s^2] beyond, tyres are far from straight running
 A_X_MAX = 6.0  # [m/s^2]
 # [m/s^3] at steeper torque the samples show clocks, filters and tyre lag: 10 ms are 0.1 m/s^2
 JERK_MAX, JERK_S = 10.0, 0.1
+SHIFT_JERK, SHIFT_S = 2.0, 1.0  # [m/s^3] of a torque that falls away and comes back, and the most time between [s]
+SETTLES_S = 2.0  # [s] after a gear shift, until the body no longer pitches (K)
+SHIFTS_MOST = 0.3  # [-] of the drive: beyond, the torque is noisy
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
 BRAKES, LONG_AGO_S = -0.8, 60.0  # [m/s^2], [s] braking, and when it has been long ago
 WHILE_S = -15.0  # [s] in place of it while braking: far enough to act as it does after it, or not at all
@@ -59,7 +62,8 @@ class Drive:
     """One drive: `course` for the simulation, `columns` measured (n,), `mask` (m,) of usable blocks of 0.1 s. `speed`
     (n,) is the measured speed without noise [m/s]; that of the course leads it by the lag of the simulation.
     `coordinates` (m,): quantities that a remaining error may depend on. `untorqued`: the log has no torque, the one
-    that the base model needs for the measured speed replaces it, and the force balance is not judged."""
+    that the base model needs for the measured speed replaces it, and the force balance is not judged. `settling` (m,):
+    blocks in and behind a gear shift: they show a road, but no effect (`calm`)."""
 
     name: str
     dt: float
@@ -69,6 +73,7 @@ class Drive:
     columns: Mapping[str, FloatArray]
     channels: tuple[str, ...]
     mask: BoolArray
+    settling: BoolArray
     coordinates: Mapping[str, FloatArray]
     present: frozenset[str]
     untorqued: bool
@@ -165,11 +170,17 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
             notes.append(f"{unlogged}, driven stretches are used")
     left_out = _widened(bad, BESIDE_S, dt) | _widened(np.abs(_jerk(logged, vehicle, dt)) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
+    settling = block_means(_shifting(_jerk(torque, vehicle, dt), dt).astype(np.float64), dt) > 0.0
     return Drive(
-        name, dt, vehicle, course, speed, filled, channels, mask, _coordinates(filled, course, speed, v, dt),
-        present, not torqued, n * dt,
+        name, dt, vehicle, course, speed, filled, channels, mask, mask & settling,
+        _coordinates(filled, course, speed, v, dt), present, not torqued, n * dt,
         (*notes, *_judged_on_water(mask, course, dt)),
     )  # fmt: skip
+
+
+def calm(drive: Drive) -> Drive:
+    """The drive without gear shifts and what swings behind them."""
+    return replace(drive, mask=drive.mask & ~drive.settling)
 
 
 def _judged_on_water(mask: BoolArray, course: Course, dt: float) -> list[str]:
@@ -192,7 +203,7 @@ def rolling_under(drive: Drive, model: Model) -> Drive:
     """The drive without what is left out where a wheel floats in the simulation of a model."""
     floats = floating({}, drive.speed, drive.vehicle, drive.course, (model,))
     rolls = block_means(_widened(floats, BESIDE_S, drive.dt).astype(np.float64), drive.dt) == 0.0
-    return replace(drive, mask=drive.mask & rolls)
+    return replace(drive, mask=drive.mask & rolls, settling=drive.settling & rolls)
 
 
 def _slides(led: Mapping[str, FloatArray], vehicle: Vehicle) -> BoolArray:
@@ -289,6 +300,21 @@ def _jerk(torque: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
     k = max(1, round(0.5 * JERK_S / dt))
     padded = np.pad(a, k, mode="edge")
     return np.asarray((padded[2 * k :] - padded[: -2 * k]) / (2 * k * dt))
+
+
+def _shifting(jerk: FloatArray, dt: float) -> BoolArray:
+    """Where a gear is shifted, (n,): the torque falls away and comes back, and body and driveline swing for a while.
+
+    `jerk` (n,) as of `_jerk`, positive where the torque drives more. [m/s³]
+    """
+    at = np.arange(jerk.size)
+    fell = np.maximum.accumulate(np.where(jerk < -SHIFT_JERK, at, -jerk.size))
+    back = (jerk > SHIFT_JERK) & ((at - fell) * dt < SHIFT_S)
+    ends = np.zeros(jerk.size + 1)
+    np.add.at(ends, fell[back], 1.0)
+    np.add.at(ends, np.minimum(at[back] + round(SETTLES_S / dt), jerk.size), -1.0)
+    shifting = np.cumsum(ends[:-1]) > 0.5
+    return np.asarray(shifting & (shifting.mean() < SHIFTS_MOST))
 
 
 def _widened(bad: BoolArray, by: float, dt: float) -> BoolArray:

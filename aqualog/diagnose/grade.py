@@ -163,7 +163,7 @@ class _Bins:
 
     @staticmethod
     def of(drive: Drive, residual: FloatArray) -> _Bins | None:
-        good = drive.mask & np.isfinite(residual).all(axis=0)
+        good = (drive.mask | drive.settling) & np.isfinite(residual).all(axis=0)
         position = drive.coordinates["position"]
         where = np.floor_divide(np.maximum(position, 0.0), BIN_M).astype(np.intp)
         k = int(where.max()) + 1

@@ -158,26 +158,30 @@ def confirmed_torque(torque: FloatArray, a: FloatArray, dt: float, per_torque: f
         return torque
     late = np.linspace(-LATEST_S, LATEST_S, 61)
     turns = np.exp(2j * np.pi * np.outer(late, f))
-    best = turns[int(np.argmax((turns * np.where(most, cross, 0.0)).real.sum(axis=1)))]
+    lag = int(np.argmax((turns * np.where(most, cross, 0.0)).real.sum(axis=1)))
     # what is sure: torque that is left out is lost, noise that is left in becomes an effect
     coherence = np.clip(np.abs(cross) ** 2 / np.maximum(power * moved, 1e-300), 0.0, 1.0)
     unsure = np.sqrt((1.0 - coherence) * moved * power / (lines.shape[1] * (2.0 * reach + 1.0)))
-    share = ((best * cross).real - SURELY * unsure) / np.maximum(power, 1e-300) / (gain * per_torque)
+    share = ((turns[lag] * cross).real - SURELY * unsure) / np.maximum(power, 1e-300) / (gain * per_torque)
     share = np.where(f <= SURE_HZ[1], 1.0, np.clip(share, 0.0, 1.0))
-    ends = np.array([_ends(x, dt) for x in torque])
+    both = np.concatenate([torque, a[None]])
+    ends = np.array([_ends(x, dt) for x in both])
     line = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * np.linspace(0.0, 1.0, n)
-    mirrored = np.concatenate([torque - line, (line - torque)[:, ::-1]], axis=1)
+    mirrored = np.concatenate([both - line, (line - both)[:, ::-1]], axis=1)
     weights = np.interp(np.fft.rfftfreq(2 * n, dt), f, share)
     sure = line + np.fft.irfft(np.fft.rfft(mirrored, axis=1) * weights, 2 * n, axis=1)[:, :n]
-    return np.asarray(sure + _stands_out((torque - sure).sum(axis=0), dt) * (torque - sure))
+    left = torque - sure[:4]
+    answer = np.roll(a - sure[4], -round(float(late[lag]) / dt)) / (gain * per_torque)
+    return np.asarray(sure[:4] + _answered(left.sum(axis=0), answer, dt) * left)
 
 
-def _stands_out(x: FloatArray, dt: float) -> FloatArray:
-    """The weight of Wiener's filter [wiener1949] of what is left of a torque, by its own power around each sample: a
-    jump, which no filter of frequencies follows, is not noise. (n,)"""
+def _answered(x: FloatArray, answer: FloatArray, dt: float) -> FloatArray:
+    """The share of what is left of a torque that the car's `answer` confirms around each sample, where it stands out
+    there: a jump, which no filter of frequencies follows, is not noise. (n,)"""
     local = smooth(x * x, dt, JUMP_S)
-    noise = float(np.median(local))
-    return np.maximum(1.0 - JUMPS * noise / np.maximum(local, 1e-300), 0.0)
+    stands_out = local > JUMPS * float(np.median(local))
+    share = smooth(x * answer, dt, JUMP_S) / np.maximum(local, 1e-300)
+    return np.where(stands_out, np.clip(share, 0.0, 1.0), 0.0)
 
 
 def _neighbours(x: NDArray[np.complex128] | FloatArray) -> tuple[NDArray[np.intp], NDArray[np.complex128]]:

@@ -73,14 +73,15 @@ class Refit:
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """Inner products under noise and tolerances: u' (I - A' M A) w for whitened rows; `A` (k, N), `M` (k, k); `apart`
-    (K,): standard deviations that are added to those of the values found instead; `coarse`: share of the log-likelihood
-    that counts."""
+    """Inner products under noise and tolerances: u' (I - A' M A) w for whitened rows; `A` (k, N), `M` (k, k); `allowed`
+    (K,): standard deviations of the tolerances, `apart` (K,): those that are added to those of the values found
+    instead; `coarse`: share of the log-likelihood that counts."""
 
     parts: tuple[Part, ...]
     weighings: tuple[Weighing, ...]
     A: FloatArray
     M: FloatArray
+    allowed: FloatArray
     apart: FloatArray
     coarse: float = 1.0
 
@@ -97,6 +98,13 @@ class Metric:
             x = u[:, i : i + CHUNK].astype(np.float64, copy=False)
             out += x @ (x if w is u else w[:, i : i + CHUNK].astype(np.float64, copy=False)).T
         return np.asarray(out)
+
+    def deviations(self, residuals: Sequence[FloatArray]) -> FloatArray:
+        """What the tolerances most likely deviate by beside residuals (C, n) of each drive. (K,)"""
+        out = np.zeros(self.allowed.size)
+        k = self.allowed > 0.0
+        out[k] = self.allowed[k] * (self.M @ self.across(self.rows([r[None] for r in residuals]))[0])
+        return out
 
     def across(self, u: FloatArray) -> FloatArray:
         """Inner products of rows (a, N) with those of the tolerances, in double precision. (a, k)"""
@@ -135,7 +143,7 @@ def metric(
     A = np.concatenate(pieces, axis=1) if len(pieces) > 1 else pieces[0]
     A *= np.float32(math.sqrt(coarse))
     M = np.asarray(np.linalg.inv(np.eye(len(A)) + products(A)))
-    return Metric(arena.parts, tuple(weighings), A, M, apart, coarse)
+    return Metric(arena.parts, tuple(weighings), A, M, sd, apart, coarse)
 
 
 def likeliest(evidence: Evidence, measure: Metric, residuals: Sequence[FloatArray], model: Model) -> Model:
@@ -298,10 +306,12 @@ def repeats(refit: Refit, arena: Arena, noises: Sequence[Noise], names: Containe
     return tuple(out)
 
 
-def silent(refit: Refit, arena: Arena, noises: Sequence[Noise]) -> frozenset[str]:
-    """Names in a refitted set that are worth naming but do not make the measurement likelier, each beside the others;
-    what needs wheel speeds must do so in their channels."""
-    G, b = (x.sum(axis=0) for x in _by_third(refit, arena, noises))
+def silent(refit: Refit, arena: Arena, noises: Sequence[Noise], measure: Metric) -> frozenset[str]:
+    """Names in a refitted set that are worth naming but do not make the measurement likelier, each beside the others
+    and what the file allows; what needs wheel speeds must do so in their channels."""
+    theta = measure.deviations(refit.residuals)
+    allowed = [np.tensordot(theta, s, axes=1) for s in arena.evidence.signatures]
+    G, b = (x.sum(axis=0) for x in _by_third(refit, arena, noises, allowed))
     # without a reference velocity they are those between axles and sides
     wheels = np.array(["slip" in c for c in arena.evidence.drives[0].channels])
     out = set()
@@ -317,13 +327,16 @@ def silent(refit: Refit, arena: Arena, noises: Sequence[Noise]) -> frozenset[str
     return frozenset(out)
 
 
-def _by_third(refit: Refit, arena: Arena, noises: Sequence[Noise]) -> tuple[FloatArray, FloatArray]:
-    """Inner products of the set's signatures, and theirs with the residual before it, by thirds of the used time and by
-    channel, (3, C, k, k) and (3, C, k)."""
+def _by_third(
+    refit: Refit, arena: Arena, noises: Sequence[Noise], allowed: Sequence[FloatArray] = ()
+) -> tuple[FloatArray, FloatArray]:
+    """Inner products of the set's signatures, and theirs with the residual before it, less what is `allowed` of each
+    drive, by thirds of the used time and by channel, (3, C, k, k) and (3, C, k)."""
     k, count = len(refit.off), len(arena.evidence.drives[0].channels)
     G, b = np.zeros((THIRDS, count, k, k)), np.zeros((THIRDS, count, k))
     for part, noise in zip(arena.parts, noises, strict=True):
-        own = np.concatenate([refit.signatures[part.drive], refit.before(part.drive)[None]])[..., part.at]
+        before = refit.before(part.drive) - (allowed[part.drive] if allowed else 0.0)
+        own = np.concatenate([refit.signatures[part.drive], before[None]])[..., part.at]
         rows = whitened(bridged(own, part.mask), noise).reshape(own.shape)
         third = np.minimum(THIRDS * np.cumsum(part.mask) // max(int(part.mask.sum()), 1), THIRDS - 1)
         for t in range(THIRDS):

@@ -18,7 +18,7 @@ from aqualog.diagnose.arena import by_drives, competing
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
-from aqualog.diagnose.drive import ON_WATER, Drive, led_by, prepare
+from aqualog.diagnose.drive import ON_WATER, Drive, calm, led_by, prepare
 from aqualog.diagnose.evidence import SURROGATES, Evidence, around_water, recentred, tolerant
 from aqualog.diagnose.faster import Late, faster, found_late, joined, with_rings
 from aqualog.diagnose.file_values import in_words, not_calibrated, with_known
@@ -209,6 +209,7 @@ def _simulated(
         model = with_profile(model, road)
     if roads:
         ready = [led_by(d, model) for d in ready]
+    ready = [calm(d) for d in ready]
     asked, untested = hypotheses(ready, model)
     asked = late.known(asked)
     evidence = simulated(ready, asked, model, tell)

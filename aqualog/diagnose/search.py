@@ -264,7 +264,9 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
     done: dict[Members, Option | None] = dict(zip(chosen, beside(one, chosen), strict=True))
     # an effect that does not show where it acts is out of every set; what remains may stand, if all of it shows
     noises, absent = [w.noise for w in posterior.weighings], set[str]()
-    shown = {m: silent(o.refit, arena, noises) for m, o in done.items() if o is not None and o.refit is not None}
+    shown = {
+        m: silent(o.refit, arena, noises, measure) for m, o in done.items() if o is not None and o.refit is not None
+    }
     for m, own in shown.items():
         # beside the best set, no further effect has to make visible what does not show in it
         if names := own | (shown.get(best, frozenset()) if set(best) <= set(m) else frozenset()):
@@ -273,7 +275,7 @@ def _refitted(evidence: Evidence, arena: Arena, posterior: Posterior, model: Mod
             rest = tuple(b for b in m if arena.name(b) not in names)
             if rest and rest not in done:
                 left = one(rest)
-                done[rest] = None if left and left.refit and silent(left.refit, arena, noises) else left
+                done[rest] = None if left and left.refit and silent(left.refit, arena, noises, measure) else left
     within = {}  # the members of a refitted set that are not at a physical bound
     for m, o in done.items():
         if o is not None and o.refit is not None:

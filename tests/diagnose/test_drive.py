@@ -11,7 +11,7 @@ from aqualog.core.errors import SignalError
 from aqualog.core.notation import WHEELS
 from aqualog.core.vehicle import KEYS, Provenance, Vehicle
 from aqualog.diagnose.channels import CHANNELS, block_means
-from aqualog.diagnose.drive import led_by, prepare
+from aqualog.diagnose.drive import _shifting, calm, led_by, prepare
 from aqualog.diagnose.hypotheses import residual
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import follow
@@ -151,6 +151,27 @@ def test_jumps_of_the_torque_are_left_out_and_no_more_than_that():
     assert not d.mask[299:302].any()
     assert d.mask[:297].all()
     assert d.mask[304:].all()
+
+
+@pytest.mark.parametrize(("falls_for", "left_out"), [(0.4, True), (3.0, False)], ids=["shift", "the driver lifts"])
+def test_a_gear_shift_is_left_out_until_the_body_is_calm_again(falls_for, left_out):
+    log = plain()
+    t = np.arange(log.frame.height) * log.dt
+    ramp = np.clip((t - 30.0) / 0.15, 0.0, 1.0) - np.clip((t - 30.0 - falls_for) / 0.15, 0.0, 1.0)
+    less = pl.Series(-0.15 * CAR.mass * CAR.r_e_r * ramp)  # 0.6 m/s^2 in all, 4 m/s^3
+    columns = [(pl.col(f"torque_{w}") + less).alias(f"torque_{w}") for w in WHEELS]
+    d = prepare(changed(log, log.frame.with_columns(*columns, pl.col("a_x") - pl.Series(0.6 * ramp))), CAR, "a")
+    assert d.mask.all()
+    rest = calm(d)
+    assert rest.mask[302:320].any() != left_out
+    assert rest.mask[:298].all()
+    assert rest.mask[330:].all()
+
+
+def test_a_torque_that_falls_away_all_the_time_is_noise():
+    jerk = np.tile([-3.0, 3.0], 500)
+    assert not _shifting(jerk, 0.01).any()
+    assert _shifting(np.where(np.arange(1000) < 20, jerk, 0.0), 0.01)[:200].all()
 
 
 def test_radii_are_not_known_where_wheel_speeds_are_those_of_a_control_unit():

@@ -70,15 +70,34 @@ def test_an_effect_shows_where_it_acts(effect, where, shows, out):
     noise = 0.5 * rng.standard_normal((2, 2400))
     drive = SimpleNamespace(channels=("kinematic", "slip_rl"))
     a = SimpleNamespace(
-        evidence=SimpleNamespace(drives=[drive]), parts=[SimpleNamespace(drive=0, at=slice(None), mask=mask)]
+        evidence=SimpleNamespace(drives=[drive], signatures=[np.zeros((0, *signature.shape[1:]))]),
+        parts=[SimpleNamespace(drive=0, at=slice(None), mask=mask)],
     )
     # where it does not show, the other channel of a wrong set is worse with it
     left = noise + (np.array(shows) - 1.0)[:, None] * 0.3 * signature[0]
     off = np.array([0.3])
     refit = Refit((h,), 1.0 + off, off, np.eye(1), 0.0, Model(), (left,), (signature,), (False,))
-    found = silent(refit, a, [fit_noise(noise, mask, np.eye(2))])
+    exact = SimpleNamespace(deviations=lambda _: np.zeros(0))
+    found = silent(refit, a, [fit_noise(noise, mask, np.eye(2))], exact)
     name = effect if where == "r" else f"{effect}@{where}"  # what one signal does not show, another one may
     assert found == (frozenset({name}) if out else frozenset())
+
+
+def test_what_the_file_has_wrong_does_not_hide_an_effect():
+    """A slip slope of the file that is off would make the slip worse with the right torque gain than without it."""
+    h, rng = Hypothesis(EFFECTS["torque_gain"], None, ("gain",)), np.random.default_rng(5)
+    slip, mask = slow(rng.standard_normal((2400, 1)), 0.9).T, np.ones(2400, dtype=bool)
+    signature, allowed = np.concatenate([slip, 0.3 * slip])[None], np.concatenate([0.0 * slip, slip])[None]
+    noise, off = 0.5 * rng.standard_normal((2, 2400)), np.array([0.3])
+    part = SimpleNamespace(drive=0, at=slice(None), mask=mask)
+    a = SimpleNamespace(
+        evidence=SimpleNamespace(drives=[SimpleNamespace(channels=("kinematic", "slip_rl"))], signatures=[allowed]),
+        parts=[part],
+    )
+    refit = Refit((h,), 1.0 + off, off, np.eye(1), 0.0, Model(), (noise - 0.6 * allowed[0],), (signature,), (False,))
+    for theta, out in ((-0.6, set()), (0.0, {"torque_gain"})):
+        exact = SimpleNamespace(deviations=lambda _, by=theta: np.array([by]))
+        assert silent(refit, a, [fit_noise(noise, mask, np.eye(2))], exact) == out
 
 
 def test_probabilities_rise_with_the_share_of_the_posterior():

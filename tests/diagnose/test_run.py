@@ -71,6 +71,15 @@ def test_the_first_sentence_says_how_many_drives_it_stands_on(monkeypatch):
     assert any("left out: " in n for n in d.notes)
 
 
+def test_a_gear_shift_is_not_compared():
+    log = noisy()
+    t = np.arange(log.frame.height) * log.dt
+    gap = pl.Series(np.interp(t, [30.0, 30.15, 30.4, 30.55], [0.0, 1.0, 1.0, 0.0]))
+    less = [(pl.col(f"torque_{w}") - 0.15 * CAR.mass * CAR.r_e_r * gap).alias(f"torque_{w}") for w in WHEELS]
+    shifted = changed(log, log.frame.with_columns(*less, pl.col("a_x") - 0.6 * gap))
+    assert 2.0 < told(log=log).used_s - told(log=shifted).used_s < 3.5
+
+
 def test_the_friction_of_a_differential_is_no_effect(monkeypatch):
     """In curves it brakes the outer wheel and drives the inner one, which a log of the axle's torque does not show."""
     ask(
