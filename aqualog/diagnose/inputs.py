@@ -137,8 +137,8 @@ def quiet_torque(torque: FloatArray, dt: float, rate_hz: float | None = None) ->
 
 
 def confirmed_torque(torque: FloatArray, a: FloatArray, dt: float, per_torque: float) -> FloatArray:
-    """Wheel torques (4, n) [N·m] with each frequency weighted by the share that the car's acceleration confirms: the
-    cross spectrum of both over the power of the torque, which is the weight of Wiener's filter [wiener1949].
+    """Wheel torques (4, n) [N·m] with each frequency weighted by the share that the car's acceleration confirms: cross
+    spectrum over the torque's power, the weight of Wiener's filter [wiener1949]. Around a jump, the share there.
 
     `a` (n,): measured acceleration, finite, whose own noise does not matter [m/s²]; `per_torque`: acceleration per
     torque of the car of the file, compared at low frequencies only [m/s²/(N·m)]. Unchanged if the drive is too short or
