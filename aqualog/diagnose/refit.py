@@ -151,12 +151,9 @@ def likeliest(evidence: Evidence, measure: Metric, residuals: Sequence[FloatArra
     All tolerances deviate together, theta = (S^-2 + A'A)^-1 A'y, each up to `FARTHEST`; those of a drive or a lane, and
     less friction, with which wheels would spin, are left out. A term that the model has keeps its values. `measure`:
     with all tolerances in full."""
-    k = np.flatnonzero(evidence.forgiven > 0.0)
-    theta = np.zeros(evidence.count)
     owner = {c: h for h, columns in zip(evidence.asked, evidence.columns, strict=True) for c in columns}
-    likely = measure.M @ measure.across(measure.rows([r[None] for r in residuals]))[0]
-    least = [0.0 if owner[c].effect.name == "friction" else -FARTHEST for c in k.tolist()]
-    theta[k] = evidence.forgiven[k] * np.clip(likely, least, FARTHEST)
+    least = [0.0 if owner[c].effect.name == "friction" else -FARTHEST for c in range(evidence.count)]
+    theta = np.clip(measure.deviations(residuals), least * measure.allowed, FARTHEST * measure.allowed)
     own, has = [], {(t.effect.name, t.place) for t in model.terms}
     for h, columns in zip(evidence.asked, evidence.columns, strict=True):
         stays = h.lane is None and h.effect.belongs in ("car", "tyre")
