@@ -119,7 +119,11 @@ def _dry(data: CampaignData, known: Mapping[str, float]) -> dict[str, Cell]:
         wheels = [w for w in WHEELS if is_awd or w not in info.vehicle.driven]
         slip, mu = (np.mean([samples.array(f"{n}_{w}") for w in wheels], axis=0) for n in ("slip", "mu"))
         late, v = late_slip(samples, known.get(source_of(info)[0], 0.0)), samples.array("v_x") / _V_UNIT
-        return Picked({"u": late.rate, "slip": slip - late.slip, "mu": mu if is_awd else np.zeros_like(v), "v": v})
+        # behind the lane a wheel that floated comes back while the car speeds up again
+        spun = [samples.bits(f"{kind}_{w}") for w in wheels for kind in ("spin", "minor")]
+        without = {"a wheel spins": samples.around(np.any(spun, axis=0))}
+        columns = {"u": late.rate, "slip": slip - late.slip, "mu": mu if is_awd else np.zeros_like(v), "v": v}
+        return Picked(columns, without)
 
     found, _ = cells(
         data, Plan(("vehicle",)), wheels=lambda _: ("",), columns=columns, road="dry", by_speed=False

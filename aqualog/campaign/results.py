@@ -123,6 +123,12 @@ class RunSamples:
         """Straight driving that regressions can use."""
         return self.bits_of("reason", 0)
 
+    def around(self, which: BoolArray) -> BoolArray:
+        """Samples within `SETTLING_S` of marked ones: on its way there and back a wheel slides."""
+        marked = self.t[which]
+        found: BoolArray = np.searchsorted(marked, self.t + SETTLING_S) > np.searchsorted(marked, self.t - SETTLING_S)
+        return found
+
     def bits_of(self, name: str, value: int) -> BoolArray:
         """Where a column of codes has a value."""
         found: BoolArray = self.frame[name].to_numpy() == value

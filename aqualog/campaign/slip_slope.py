@@ -12,7 +12,7 @@ import numpy as np
 from aqualog.campaign.bins import DEPTH_KEYS, NO_DRIVETRAIN, Cell, Group, Picked, Plan, Pool, cells, driven_of
 from aqualog.campaign.delay import Delay, Source, delays, late_slip, source_of
 from aqualog.campaign.expected import LINEAR, Expected, contact_of, expected_of_runs, friction_of, tangent_of
-from aqualog.campaign.results import SETTLING_S, CampaignData, RunInfo, RunSamples
+from aqualog.campaign.results import CampaignData, RunInfo, RunSamples
 from aqualog.core.intervals import NOWHERE, Interval, student_quantile
 from aqualog.core.moments import Design
 from aqualog.core.notation import SIDES
@@ -152,10 +152,8 @@ def slip_slopes(data: CampaignData, plan: Plan, *, robust: bool = False, limits:
             return _without_slip(info)
         if np.isnan(mu).all():
             return "no traction: no torque of the driven wheels"
-        t, spun = samples.t, samples.t[samples.bits(f"spin_{wheel}") | (np.abs(slip) > S_MAX)]
         without = {
-            # on its way there and back it slides, and has no slope
-            "the wheel spins": np.searchsorted(spun, t + SETTLING_S) > np.searchsorted(spun, t - SETTLING_S),
+            "the wheel spins": samples.around(samples.bits(f"spin_{wheel}") | (np.abs(slip) > S_MAX)),
             f"traction beyond {WIND_UP:g}": np.abs(mu) > WIND_UP,
         }
         u = np.zeros_like(slip)

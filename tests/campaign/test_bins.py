@@ -166,6 +166,20 @@ def test_a_late_velocity_is_found_where_the_acceleration_changes_its_sign(tau):
     assert found.value == pytest.approx(tau, abs=0.003)  # a tau for the speed gained in tau would say 0.23
 
 
+def test_a_wheel_that_comes_back_behind_the_lane_is_no_delay():
+    behind = Made(grid(WORN), tau=0.1)
+    for k, samples in behind._samples.items():
+        t, f = samples.t, samples.frame
+        # who speeds up floats longer, and comes back on the dry road
+        back = np.where(t > 8.0, -0.2 * (k % 5) / 4 * np.exp(-np.maximum(t - 9.2, 0.0) / 0.2), 0.0)
+        spun = [pl.Series(f"spin_{w}", back < -0.005) for w in ("fl", "fr")]
+        slips = [pl.Series(f"slip_{w}", f[f"slip_{w}"].to_numpy() + back) for w in ("fl", "fr")]
+        behind._samples[k] = RunSamples(f.with_columns(*spun, *slips), t, samples.on_water)
+    (found,) = delays(behind).values()
+    assert found.value == pytest.approx(0.1, abs=0.002)
+    assert found.half < 0.006
+
+
 def test_a_delay_that_the_driving_cannot_tell_stays_open():
     constant = Made(grid(WORN, accelerations=(0.0,)), tau=0.1)
     (found,) = delays(constant).values()
