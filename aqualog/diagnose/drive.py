@@ -127,6 +127,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         torque = inputs.confirmed_torque(torque, moves, dt, 1.0 / (vehicle.mass * vehicle.r_e("fl")))
     else:
         logged = torque = inputs.needed_torque(v, vehicle, dt)
+        slowing = inputs.slowing_torque(v, vehicle, dt)
         torques = {f"torque_{w}" for w in vehicle.driven}
         lacks = ", ".join(sorted(torques - present)) if torques & present else "wheel torque"
         notes.append(f"no {lacks} in the log: the torque is the one that the model needs for the measured speed")
@@ -134,7 +135,14 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     t = np.arange(n, dtype=np.float64) * dt
     steer = inputs.road_wheel_angle(filled, v, vehicle, dt, most=1.2 * A_Y_MAX)
     measured = Course(
-        t, torque, steer, speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels, position=np.cumsum(v) * dt
+        t,
+        torque,
+        steer,
+        speed,
+        _lanes(filled, dt),
+        has_rods="tie_rod_fl" in channels,
+        position=np.cumsum(v) * dt,
+        slowing=None if torqued else slowing,
     )
     course = _without_lag(measured, led := follow(vehicle, measured, Model()))
     floats = floating(filled, v, vehicle, course)
@@ -156,8 +164,9 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         notes.append(f"braking is left out: {why}")
     if not torqued:
         bad |= np.gradient(speed, dt) > inputs.A_MOST
-        # a motor slows the car too, and presses no brake; an accelerometer shows offsets and roads all the same
-        if not {"a_x", "brake_pressure"} <= filled.keys():
+        # a motor slows the car too, and presses no brake; an accelerometer shows offsets and roads all the same. Of two
+        # driven axles nobody knows which one a motor slows
+        if len(vehicle.driving) == len(WHEELS) or not {"a_x", "brake_pressure"} <= filled.keys():
             bad |= inputs.smooth(np.gradient(speed, dt), dt, inputs.SPEED_S) < -inputs.roll_out(v, vehicle) - ROLLS_OUT
             notes.append("only driving and rolling out are used: the torque that slows the car is not known")
     elif "brake_pressure" not in filled:

@@ -33,7 +33,7 @@ EDGES = 75  # of intervals, evenly over the drive
 OUTLIER = 6.0  # of the median size (4 standard deviations), beyond which a sample counts no more
 LASTS = 20  # [samples] to either side, of whose median it may be an outlier
 SHORTEST = 3  # edges outside of an interval, and from the drive's ends to what begins
-SHORTEST_S = 1.0  # of a change that begins; a faster one looks the same in blocks of 0.1 s
+SHORTEST_S = 1.0  # of a change that begins, in blocks of 0.1 s, and of one that comes again after equal times
 INTERVALS, PART = 5, 0.1  # the most intervals of a form, each with this share of what the one before explains (K)
 AGAIN, AGAIN_STEP, PHASES = (1.5, 25.0), 0.03, 40  # times that patches come again over a drive; phases of one turn
 # waves: from half a period over the drive to ... periods, in steps of ...
@@ -314,9 +314,10 @@ def _patch(
             step *= 0.5
         else:
             gain, now = float(each[k]), tried[k]
-    if gain <= 0.0:
-        return None
     start, length, period = now
+    # what the driver does again and again jolts the car for an instant each time
+    if gain <= 0.0 or (name == "t" and length < SHORTEST_S):
+        return None
     own = column(now)
     points = np.linspace(low, low + span, 8 * POINTS)
     there = np.asarray(np.mod(points - start, period) < length, dtype=np.float64)[:, None]

@@ -180,7 +180,7 @@ def _undo_wheels(measured: _Measured, before: Plant, after: Plant) -> None:
         if grows and omega in columns and (after.radius_growth[i] != 0.0 or after.leak_radius[i] != 0.0):
             ratio = effective_radius(np.ones(1), v, growth=float(after.radius_growth[i]))
             columns[omega] = ratio * (1.0 - after.leak_radius[i] * leak) * columns[omega]
-        gain = after.torque_gain / factor
+        gain = float(after.torque_gain[i]) / factor
         if gain != 1.0 and torque in columns:
             columns[torque] = gain * columns[torque]
 

@@ -16,7 +16,7 @@ from aqualog.diagnose.channels import channel_values
 from aqualog.diagnose.drive import Drive, led_by, stretches
 from aqualog.diagnose.records import name_by_place
 from aqualog.diagnose.threads import beside
-from aqualog.diagnose.tolerances import LANE_TOLERANCES, STAND_IN, TOLERANCES
+from aqualog.diagnose.tolerances import LANE_TOLERANCES, STAND_INS, TOLERANCES
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import STEP_S, Led, led_along, shown
 from aqualog.model.term import Effect, Model, Need, Parameter, Term
@@ -59,7 +59,7 @@ class Hypothesis:
     @property
     def allowed(self) -> bool:
         """Whether it is a tolerance: taken into account but never reported."""
-        return self.effect in TOLERANCES or self.lane is not None or self.effect is STAND_IN
+        return self.effect in TOLERANCES or self.lane is not None or self.effect in STAND_INS
 
     @property
     def lane(self) -> int | None:
@@ -123,6 +123,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     wheels = all(f"omega_{w}" in present for w in WHEELS)
     has: dict[Need, bool] = {"water depth": wet, "wheel torque": torque, "wheel speeds": wheels}
     has["a_x or wheel torque"] = torque or "a_x" in present
+    driven = [a for a, own in AXLES.items() if {*own} & {*drives[0].vehicle.driving}]
     length, names = max(d.duration_s for d in drives), [d.name for d in drives]
     apart = names if 1 < len(names) <= MOST_APART else []
     out: list[Hypothesis] = []
@@ -138,6 +139,8 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         free = tuple(p.name for p in effect.parameters[: effect.drive.count])
         wheels_of = WHEELS if effect.drive.by_wheel else ()
         places = effect.drive.places or ((*wheels_of, *AXLES, None) if "fl" in effect.places else (None,))
+        if effect.drive.of_motors and len(driven) < len(AXLES):
+            places = (None,)
         asked = [w for w in places if (torque if w in ("torque", "torque_fl") else _SIGNALS.get(w, set()) <= present)]
         if not asked:
             untested[effect.name] = f"no {' or '.join(str(p) for p in places)} in the log"
@@ -151,9 +154,8 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             own = AXLES.get(where or "", WHEELS if where is None else (where,))
             most = math.inf if set(own) <= {*drives[0].vehicle.driving} else effect.drive.most_free
             out += [Hypothesis(effect, where, free, fixed, room, n, most) for n in ("", *alone) for fixed in variants]
-    driven = [a for a, own in AXLES.items() if torque and {*own} & {*drives[0].vehicle.driving}]
-    has_it = [(e, w) for e in TOLERANCES for w in (driven if e.places else (None,))]
-    out += [Hypothesis(e, w, ("by",)) for e, w in (*has_it, *(() if torque else ((STAND_IN, None),)))]
+    tolerated = TOLERANCES if torque else (*(e for e in TOLERANCES if not e.places), *STAND_INS)
+    out += [Hypothesis(e, w, ("by",)) for e in tolerated for w in (driven if e.places else (None,))]
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
     # without torque there is no drag to test, nor one that differs
     asked_at = {(h.effect.name, h.where) for h in out}

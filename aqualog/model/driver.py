@@ -57,7 +57,7 @@ def driver(m, c, p, wheels, loads, warm, drag, slope_down):  # type: ignore[no-u
         f[DRIVE] = 0.0
         f[INTEGRAL] = 0.0
         f[BRAKE] = 0.0
-        drive = c.drive * p.torque_gain
+        drive = c.drive * ((1.0 - split_rear) * wheels[0].torque_gain + split_rear * wheels[2].torque_gain)
     return Command(drive, c.brake + y[BRAKE], _excitation(c, p, drive / r_drive), split_rear)
 
 

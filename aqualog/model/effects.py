@@ -259,11 +259,11 @@ _ALL = [
     ),
     Effect(
         "torque_gain", "torque at the wheels over the reported one [-]",
-        "The wheels get {gain:.3f} times the torque in the log.", "axle efficiency 95-97 % (V)",
+        "The wheels{at} get {gain:.3f} times the torque in the log.", "axle efficiency 95-97 % (V)",
         (Parameter("gain", "-", 1.0, 0.05, 0.3, 2.0, 0.01, "true over reported",
             DayToDay("inertia", lambda share, *_: share, "torque_gain")),),
-        _on_plant(lambda p, v, _: p._replace(torque_gain=p.torque_gain * v["gain"])), twins=("payload_mass",),
-        drive=DriveSearch((_TORQUE,)),
+        _times(torque_gain="gain"), ("f", "r"), twins=("payload_mass",),
+        drive=DriveSearch((_TORQUE,), places=(None, "f", "r"), tolerance_at={"f": 0.01, "r": 0.01}, of_motors=True),
     ),
     Effect(
         "trailer", "mass and air drag of a trailer", "A trailer of {mass:.0f} kg was towed.", "caravans 0.5-1.5 t (K)",
@@ -405,7 +405,7 @@ _ALL = [
         "0.12-0.45 m (V)",
         (Parameter("length", "m", 0.0, 0.3, 0.0, 3.0, 0.05, "longitudinal and lateral"),),
         _plus(relaxation_length="length"), _WHEEL_PLACES, twins=("signal_delay",),
-        drive=DriveSearch((_SPEEDS,), tolerance=0.3, is_quick=True), belongs="tyre",
+        drive=DriveSearch((_SPEEDS, _TORQUE), tolerance=0.3, is_quick=True), belongs="tyre",
     ),
     Effect(
         "contact_loss", "lost contact on water [-]", "The water lifts {gain:.2f} times as much of the contact{at}.",

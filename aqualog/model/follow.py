@@ -42,7 +42,8 @@ class Course:
     """Inputs of the car according to its log; arrays on an even grid `t` (n,) from 0 [s], finite.
 
     `torque` (4, n) reported net wheel torques [N·m], `steer` (n,) road-wheel angle [rad], `v_x` (n,) reference
-    velocity [m/s], `lanes` the water on the way.
+    velocity [m/s], `lanes` the water on the way. `slowing` (n,): torque of all wheels that slows the car and is not in
+    `torque` [N·m], <= 0; the plant's `slowing_share` of it acts.
     """
 
     t: FloatArray
@@ -52,6 +53,7 @@ class Course:
     lanes: tuple[Lane, ...] = field(default=())
     has_rods: bool = False
     position: FloatArray | None = None
+    slowing: FloatArray | None = None
 
 
 def setup_along(vehicle: Vehicle, course: Course, model: Model) -> Setup:
@@ -156,6 +158,8 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE, step: 
     torque = np.array([
         _undone(course.t, course.torque[i], setup.sensors, f"torque_{w}", fine) for i, w in enumerate(WHEELS)
     ])  # fmt: skip
+    if course.slowing is not None and plant.slowing_share.any():
+        torque += 0.5 * plant.slowing_share[:, None] * np.interp(fine, course.t, course.slowing)
     speed = np.maximum(_undone(course.t, course.v_x, setup.sensors, "v_x", fine), 0.0)
     # the car is where the measured one was: another resistance must not move it along its road
     grade = np.zeros_like(fine)
@@ -167,7 +171,7 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE, step: 
     road = build_road(replace(scenario, grade=()), float(speed.sum()) * step * 1.02 + 50.0)
     v, theta = float(max(speed[0], V_START)), float(grade[0])
     drag, rolling = resistance_at(plant, v, G * math.sin(theta))
-    force = float(torque[:, 0].sum()) * plant.torque_gain / float(plant.r_e.mean()) - float(rolling.sum()) - drag
+    force = float((torque[:, 0] * plant.torque_gain).sum()) / float(plant.r_e.mean()) - float(rolling.sum()) - drag
     start = rolling_state(plant, v=v, a=force / (plant.mass + plant.towed_mass), drive=0.0, split_rear=0.5)
     start[DRIVE] = 0.0
     every = round(RECORD_S / step)
@@ -208,7 +212,7 @@ def _columns(rows: FloatArray, plant: Plant, scenario: Scenario, *, rods: bool) 
     for i, w in enumerate(WHEELS):
         columns[f"omega_{w}"] = omega[i]
         columns[f"angle_{w}"] = angle[i]
-        columns[f"torque_{w}"] = torque[i] / plant.torque_gain
+        columns[f"torque_{w}"] = torque[i] / plant.torque_gain[i]
     if rods:
         names: Sequence[str] = ("F_x", "F_y", "F_z", "wave_drag", "climb", "aligning", "braking", "contact")
         columns |= steering_columns({n: wheel_columns(rows, n) for n in names}, plant, scenario)
@@ -277,7 +281,8 @@ def replay(
     controls = _undriven(
         n + 1, drive=np.interp(fine, t - t[0], torque), split_rear=np.full(n + 1, split_rear), motion_only=True, **given
     )  # fmt: skip
-    drive = float(torque[0]) * plant.torque_gain
+    gain = (1.0 - split_rear) * plant.torque_gain[0] + split_rear * plant.torque_gain[2]
+    drive = float(torque[0] * gain)
     drag, rolling = resistance_at(plant, v_0, 0.0)
     a_0 = (drive / float(plant.r_e.mean()) - rolling.sum() - drag) / plant.mass
     start = rolling_state(plant, v=v_0, a=a_0, drive=drive, split_rear=split_rear)

@@ -40,7 +40,7 @@ class Plant(NamedTuple):
     roll_time: float
     brake_split: FloatArray
     power: float  # [W] of the engine, bounds the driver's torque
-    torque_gain: float  # torque at the wheels over the torque that the car reports
+    torque_gain: FloatArray  # torque at each wheel over the torque that the car reports
     r_e: FloatArray
     r_l: FloatArray
     radius_growth: FloatArray
@@ -50,6 +50,7 @@ class Plant(NamedTuple):
     torsion_stiffness: FloatArray
     torsion_damping: FloatArray
     driveline: FloatArray  # [kg·m²] turns with the mean of both wheels of an axle
+    slowing_share: FloatArray  # of what slows a car whose torque is not known, at the wheel's axle
     preload: FloatArray  # [N·m] friction of the differential, without torque and [-] per torque of the wheel
     locking: FloatArray
     r_w: FloatArray
@@ -111,8 +112,8 @@ _OF_TYRES = (
 )  # fmt: skip
 _ADDED = ("head_wind", "cornering_drag", "warmup_extra", "towed_mass", "leak_start")
 _ADDED_AT_WHEELS = (
-    "preload", "locking", "radius_growth", "radius_loss", "brake_drag", "slip_slope_drift", "relaxation_length",
-    "leak_radius", "leak_slope",
+    "slowing_share", "preload", "locking", "radius_growth", "radius_loss", "brake_drag", "slip_slope_drift",
+    "relaxation_length", "leak_radius", "leak_slope",
 )  # fmt: skip
 
 
@@ -157,7 +158,7 @@ def build_plant(
         roll_time=0.08,  # [s] pitch and roll of a car settle in about a tenth of a second (K)
         brake_split=0.5 * np.array([brake_f, brake_f, 1.0 - brake_f, 1.0 - brake_f]),
         power=POWER_PER_MASS * vehicle.mass,
-        torque_gain=1.0,
+        torque_gain=np.ones(4),
         r_w=np.full(4, vehicle.rolling_resistance),
         warmup_time=600.0,
         slip_slope=slope * of("slip_slope_factor") * pressure_factor(p, p_ref=P_REFERENCE, p_nominal=P_NOMINAL),

@@ -216,7 +216,7 @@ def _columns(rows: FloatArray, t: FloatArray, plant: Plant, scenario: Scenario) 
     for i, w in enumerate(WHEELS):
         columns[f"omega_{w}"] = wheels["omega"][i]
         columns[f"angle_{w}"] = wheels["angle"][i]
-        columns[f"torque_{w}"] = wheels["torque"][i] / plant.torque_gain
+        columns[f"torque_{w}"] = wheels["torque"][i] / plant.torque_gain[i]
     rod_wheels = {n: wheel_columns(rows, n) for n in ("aligning", "braking", "wave_drag", "climb")}
     columns |= steering_columns(wheels | rod_wheels, plant, scenario)
     # the friction of the rack lies between the rods and the torque that holds it

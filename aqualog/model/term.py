@@ -80,7 +80,7 @@ class DriveSearch:
     together it changes nothing; `is_single`: it counts once per car, wherever it acts; `is_quick`: it acts within
     10 ms, so that only short steps show it; `divides`: it acts as one over its value, so a straight line overshoots.
     `doubt`: share by which another law of the tyre may respond. `most_free`: bound of the first parameter at wheels
-    that are not driven.
+    that are not driven; `of_motors`: an axle has it by itself only where the other one is driven, too.
     """
 
     needs: tuple[Need, ...] = ()
@@ -103,6 +103,7 @@ class DriveSearch:
     is_quick: bool = False
     divides: bool = False
     most_free: float = math.inf
+    of_motors: bool = False
 
 
 @dataclass(frozen=True, slots=True)

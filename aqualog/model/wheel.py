@@ -390,7 +390,7 @@ def _balance(i, roll, ground, wet, command, m, p, q):  # type: ignore[no-untyped
     front = i < 2
     share = 1.0 - command.split_rear if front else command.split_rear
     torque = 0.5 * share * command.drive + (0.5 if front else -0.5) * command.excitation * roll.r_e
-    torque += m.applied[i] * p.torque_gain
+    torque += m.applied[i] * q.torque_gain
     if q.preload != 0.0 or q.locking != 0.0:
         torque -= _differential_friction(m.y[OMEGA + i] - m.y[OMEGA + (i ^ 1)], torque, q.preload, q.locking)
     braking = q.brake_split * command.brake * (1.0 - m.released[i])

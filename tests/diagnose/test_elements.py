@@ -70,6 +70,11 @@ def test_a_patch_that_comes_again(name, unit, length, period):
     assert "second pass" not in forms[0].sentence
 
 
+def test_an_instant_that_comes_again_is_the_driver():
+    _, _, forms = found(12, lambda c: 900.0 * (np.mod(c["t"] - 24.4, 61.0) < 0.6))
+    assert not any(r.manner.startswith("for ") and r.depends_on == ("t",) for r in forms)
+
+
 def test_two_forces_of_different_size():
     truth = lambda t: 240.0 * trapezoid(t, 40.0, 72.0, 0.1) - 330.0 * trapezoid(t, 150.0, 166.0, 0.1)  # noqa: E731
     _, _, forms = found(11, lambda c: truth(c["t"]))

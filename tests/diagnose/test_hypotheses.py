@@ -1,5 +1,7 @@
 """What a log is asked about, and what a unit of each would do: differences of simulations."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -57,15 +59,22 @@ def test_what_has_no_signal_is_not_asked_about():
     keys = {h.key for h in asked}
     assert "signal_delay@torque" not in keys
     # a torque that stands in is made of the file's own mass and drag
-    assert not {"payload_mass", "aero_drag", "torque_gain", "head_wind"} & keys
+    assert not {"payload_mass", "aero_drag", "torque_gain", "head_wind", "relaxation_length"} & keys
     assert untested["payload_mass"] == "no wheel torque in the log"
-    assert "stand_in_torque" in keys
+    assert {"stand_in_torque@r", "slowing_torque@r"} <= keys
     assert {"signal_delay@v_x", "road_grade"} <= keys
     for dropped, lacks in ((["a_x"], False), (["a_x", *(f"torque_{w}" for w in WHEELS)], True)):
         asked, untested = hypotheses([prepare(changed(plain(), plain().frame.drop(dropped)), CAR, "a")], Model())
         of_force = {"payload_mass", "road_grade"}
         assert of_force & {h.effect.name for h in asked} == (set() if lacks else of_force)
         assert of_force & set(untested) == (of_force if lacks else set())
+
+
+@pytest.mark.parametrize(("drivetrain", "axles"), [("rwd", set()), ("awd", {"torque_gain@f", "torque_gain@r"})])
+def test_each_of_two_motors_has_a_gain(drivetrain, axles):
+    car = replace(CAR, drivetrain=drivetrain, torque_split_rear=0.6 if drivetrain == "awd" else 1.0)
+    asked, _ = hypotheses([prepare(plain(), car, "a")], Model())
+    assert {h.key for h in asked if h.effect.name == "torque_gain"} == {"torque_gain", *axles}
 
 
 def test_slip_and_radius_are_not_asked_about_without_wheel_speeds():

@@ -71,6 +71,16 @@ def test_the_first_sentence_says_how_many_drives_it_stands_on(monkeypatch):
     assert any("left out: " in n for n in d.notes)
 
 
+def test_the_gain_of_one_of_two_motors_is_named(monkeypatch):
+    ask(monkeypatch, ("torque_gain", "torque_gain@f", "torque_gain@r", *FEW))
+    car = replace(CAR, drivetrain="awd", torque_split_rear=0.55)
+    log = noisy(term("torque_gain", "f", gain=1.2), vehicle=car)
+    d = diagnose([("a", log)], car, options=QUICK)
+    assert (d.verdict, keys(d)) == ("named", {"torque_gain@f"}), d.sentence
+    assert d.causes[0].parameters["gain"].value == pytest.approx(1.2, abs=0.02)
+    assert d.sentence.startswith("The wheels (front axle) get 1.")
+
+
 def test_a_gear_shift_is_not_compared():
     log = noisy()
     t = np.arange(log.frame.height) * log.dt
