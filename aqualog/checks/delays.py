@@ -14,7 +14,7 @@ from aqualog.checks.windows import Gather, Windows
 from aqualog.core.records import FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 
-__all__ = ["delay_doubts", "delays_in"]
+__all__ = ["LATE_S", "delay_doubts", "delays_in"]
 
 LATE_S = 0.2  # [s] GNSS and filters take less (three measured cars: 0.15 and less)
 MOST_S = 3.0  # [s]
@@ -26,15 +26,15 @@ _SAID = {"v_x": "v_x comes", "omega": "the wheel speeds come", "a_x": "a_x comes
 _ADVICE = "a filter or another clock: in the signal map, [sources] has offset_s for a file; `aqualog align` finds it"
 
 
-def delays_in(signals: Signals, vehicle: Vehicle) -> list[Doubt]:
-    """Return what comes late in a drive, as `delay_doubts`."""
+def delays_in(signals: Signals, vehicle: Vehicle, *, least: float = LATE_S) -> list[Doubt]:
+    """Return what comes late in a drive, as `delay_doubts`, by `least` or more. [s]"""
     own = [s for s in signals.symbols if s.startswith(("v_x", "a_x", "omega_", "torque_"))]
     gather = Gather(own, vehicle, signals.dt)
     gather.push({s: signals.array(s) for s in own})
-    return [*delay_doubts(gather.windows())]
+    return [*delay_doubts(gather.windows(), least)]
 
 
-def delay_doubts(windows: Windows) -> Iterator[Doubt]:
+def delay_doubts(windows: Windows, least: float = LATE_S) -> Iterator[Doubt]:
     """Yield the signal that is later than all others, or before them; of two alone, which of them it is stays open."""
     step = windows.step_s
     if any(x.size < LEAST_S / step for x in windows.columns.values()):
@@ -51,7 +51,7 @@ def delay_doubts(windows: Windows) -> Iterator[Doubt]:
     most = max(map(len, related.values()), default=0)
     for name, own in related.items():
         values = [*own.values()]
-        if len(own) >= min(most, 2) > 0 and all(math.copysign(1.0, values[0]) * x >= LATE_S for x in values):
+        if len(own) >= min(most, 2) > 0 and all(math.copysign(1.0, values[0]) * x >= least for x in values):
             yield _doubt(windows, name, [*own], sum(values) / len(values))
             if most == 1:
                 return

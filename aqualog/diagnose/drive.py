@@ -63,7 +63,8 @@ class Drive:
     (n,) is the measured speed without noise [m/s]; that of the course leads it by the lag of the simulation.
     `coordinates` (m,): quantities that a remaining error may depend on. `untorqued`: the log has no torque, the one
     that the base model needs for the measured speed replaces it, and the force balance is not judged. `settling` (m,):
-    blocks in and behind a gear shift: they show a road, but no effect (`calm`)."""
+    blocks in and behind a gear shift, or where a motor may slow a car whose torque is not known: they show a road, but
+    no effect (`calm`)."""
 
     name: str
     dt: float
@@ -115,6 +116,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     torqued = "force_balance" in channels
     bridged = {s: _bridged(columns[s], dt) for s in sorted(present)}
     filled = {s: x for s, (x, _) in bridged.items()}
+    shows_road = np.zeros(n, dtype=bool)
     needed = ("a_x", "v_x", "omega_", *(("torque_",) if torqued else ()))
     for gaps in (own for s, (_, own) in bridged.items() if s.startswith(needed)):
         bad |= gaps
@@ -127,7 +129,6 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         torque = inputs.confirmed_torque(torque, moves, dt, 1.0 / (vehicle.mass * vehicle.r_e("fl")))
     else:
         logged = torque = inputs.needed_torque(v, vehicle, dt)
-        slowing = inputs.slowing_torque(v, vehicle, dt)
         torques = {f"torque_{w}" for w in vehicle.driven}
         lacks = ", ".join(sorted(torques - present)) if torques & present else "wheel torque"
         notes.append(f"no {lacks} in the log: the torque is the one that the model needs for the measured speed")
@@ -135,14 +136,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     t = np.arange(n, dtype=np.float64) * dt
     steer = inputs.road_wheel_angle(filled, v, vehicle, dt, most=1.2 * A_Y_MAX)
     measured = Course(
-        t,
-        torque,
-        steer,
-        speed,
-        _lanes(filled, dt),
-        has_rods="tie_rod_fl" in channels,
-        position=np.cumsum(v) * dt,
-        slowing=None if torqued else slowing,
+        t, torque, steer, speed, _lanes(filled, dt), has_rods="tie_rod_fl" in channels, position=np.cumsum(v) * dt
     )
     course = _without_lag(measured, led := follow(vehicle, measured, Model()))
     floats = floating(filled, v, vehicle, course)
@@ -164,10 +158,13 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
         notes.append(f"braking is left out: {why}")
     if not torqued:
         bad |= np.gradient(speed, dt) > inputs.A_MOST
-        # a motor slows the car too, and presses no brake; an accelerometer shows offsets and roads all the same. Of two
-        # driven axles nobody knows which one a motor slows
-        if len(vehicle.driving) == len(WHEELS) or not {"a_x", "brake_pressure"} <= filled.keys():
-            bad |= inputs.smooth(np.gradient(speed, dt), dt, inputs.SPEED_S) < -inputs.roll_out(v, vehicle) - ROLLS_OUT
+        # a motor slows the car too, at wheels that nobody knows, and presses no brake
+        slowed = inputs.smooth(np.gradient(speed, dt), dt, inputs.SPEED_S) < -inputs.roll_out(v, vehicle) - ROLLS_OUT
+        if {"a_x", "brake_pressure"} <= filled.keys():
+            shows_road |= _widened(slowed, BESIDE_S, dt)
+            notes.append("only driving and rolling out are used, except for a road: what slows the car is not known")
+        else:
+            bad |= slowed
             notes.append("only driving and rolling out are used: the torque that slows the car is not known")
     elif "brake_pressure" not in filled:
         unlogged = "" if every_wheel else "the torque is that of one axle: brakes are not in the log"
@@ -179,7 +176,8 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
             notes.append(f"{unlogged}, driven stretches are used")
     left_out = _widened(bad, BESIDE_S, dt) | _widened(np.abs(_jerk(logged, vehicle, dt)) > JERK_MAX, JERK_S, dt)
     mask = block_means(left_out.astype(np.float64), dt) == 0.0
-    settling = block_means(_shifting(_jerk(torque, vehicle, dt), dt).astype(np.float64), dt) > 0.0
+    shows_road |= _shifting(_jerk(torque, vehicle, dt), dt)
+    settling = block_means(shows_road.astype(np.float64), dt) > 0.0
     return Drive(
         name, dt, vehicle, course, speed, filled, channels, mask, mask & settling,
         _coordinates(filled, course, speed, v, dt), present, not torqued, n * dt,
@@ -188,7 +186,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
 
 
 def calm(drive: Drive) -> Drive:
-    """The drive without gear shifts and what swings behind them."""
+    """The drive without gear shifts and what swings behind them, and without what may slow it unknown."""
     return replace(drive, mask=drive.mask & ~drive.settling)
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aqualog.checks.delays import delays_in
+from aqualog.checks.delays import LATE_S, delays_in
 from aqualog.checks.doubts import Doubt
 from aqualog.core.intervals import Z95
 from aqualog.core.notation import AXLES, SIDES, WHEELS, side_of
@@ -279,13 +279,13 @@ class Late:
         return outcome._replace(verdict=verdict, causes=causes, certain=frozenset(), notes=(*outcome.notes, why))
 
 
-def found_late(drives: Sequence[Signals], vehicle: Vehicle, model: Model) -> Late:
-    """What comes late and is not in the model; of several drives all are doubts: each may have clocks of its own. So is
-    a delay beyond its physical bounds."""
+def found_late(drives: Sequence[Signals], vehicle: Vehicle, model: Model, *, least: float = LATE_S) -> Late:
+    """What comes late by `least` [s] or more and is not in the model; of several drives all are doubts: each may have
+    clocks of its own. So is a delay beyond its physical bounds."""
     known = {t.place for t in model.terms if t.effect.name in _SHIFTS}
-    doubts = [d for s in drives for d in delays_in(s, vehicle) if not known & _places(d)]
-    least, most = DELAY.parameters[0].low, DELAY.parameters[0].high
-    if len(drives) > 1 or any(len(_places(d)) > 1 or not least <= d.value <= most for d in doubts):
+    doubts = [d for s in drives for d in delays_in(s, vehicle, least=least) if not known & _places(d)]
+    low, high = DELAY.parameters[0].low, DELAY.parameters[0].high
+    if len(drives) > 1 or any(len(_places(d)) > 1 or not low <= d.value <= high for d in doubts):
         return Late((), tuple(doubts))
     return Late(tuple(_cause(next(iter(_places(d))), d.value) for d in doubts))
 

@@ -16,7 +16,7 @@ from aqualog.diagnose.channels import channel_values
 from aqualog.diagnose.drive import Drive, led_by, stretches
 from aqualog.diagnose.records import name_by_place
 from aqualog.diagnose.threads import beside
-from aqualog.diagnose.tolerances import LANE_TOLERANCES, STAND_INS, TOLERANCES
+from aqualog.diagnose.tolerances import LANE_TOLERANCES, STAND_IN, TOLERANCES
 from aqualog.model.effects import EFFECTS
 from aqualog.model.follow import STEP_S, Led, led_along, shown
 from aqualog.model.term import Effect, Model, Need, Parameter, Term
@@ -59,7 +59,7 @@ class Hypothesis:
     @property
     def allowed(self) -> bool:
         """Whether it is a tolerance: taken into account but never reported."""
-        return self.effect in TOLERANCES or self.lane is not None or self.effect in STAND_INS
+        return self.effect in TOLERANCES or self.lane is not None or self.effect is STAND_IN
 
     @property
     def lane(self) -> int | None:
@@ -154,7 +154,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
             own = AXLES.get(where or "", WHEELS if where is None else (where,))
             most = math.inf if set(own) <= {*drives[0].vehicle.driving} else effect.drive.most_free
             out += [Hypothesis(effect, where, free, fixed, room, n, most) for n in ("", *alone) for fixed in variants]
-    tolerated = TOLERANCES if torque else (*(e for e in TOLERANCES if not e.places), *STAND_INS)
+    tolerated = TOLERANCES if torque else (*(e for e in TOLERANCES if not e.places), STAND_IN)
     out += [Hypothesis(e, w, ("by",)) for e in tolerated for w in (driven if e.places else (None,))]
     lanes = min(MOST_LANES, max(int(stretches(d).max()) for d in drives))
     # without torque there is no drag to test, nor one that differs

@@ -19,7 +19,7 @@ from aqualog.physics.load import G
 __all__ = [
     "A_MOST", "BRAKE_PRESSURE", "LEAST_S", "SPEED_S", "V_MIN", "brakes_in_torque", "brakes_unlogged",
     "confirmed_torque", "lasting", "needed_torque", "quiet", "quiet_speed", "quiet_torque", "road_wheel_angle",
-    "roll_out", "slowing_torque", "smooth",
+    "roll_out", "smooth",
 ]  # fmt: skip
 
 SPEED_BAND_HZ = (2.0, 4.5)  # there a speed is noise: 0.1 m/s^2 are below 8 mm/s; beyond, slow buses are interpolated
@@ -209,19 +209,10 @@ def roll_out(v: FloatArray, vehicle: Vehicle) -> FloatArray:
 def needed_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
     """Torque at the driven wheels that the car of the file needs for a speed on a flat road, at most for `A_MOST`. (4,
     n) [N·m], >= 0: brakes are on all wheels, and one axle alone would lock at their deceleration."""
-    force = vehicle.mass * np.maximum(_beyond_roll_out(v, vehicle, dt), 0.0)
+    inertia = np.gradient(smooth(v, dt, SPEED_S), dt)
+    force = vehicle.mass * np.maximum(np.minimum(inertia, A_MOST) + roll_out(v, vehicle), 0.0)
     rear = {"rwd": 1.0, "fwd": 0.0}.get(vehicle.drivetrain, vehicle.torque_split_rear)
     return np.array([0.5 * (rear if w[0] == "r" else 1.0 - rear) * force * vehicle.arm(w) for w in WHEELS])
-
-
-def slowing_torque(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
-    """Torque of all wheels that slows the car of the file more than rolling out, by motors or brakes at wheels that
-    nobody knows. (n,) [N·m], <= 0"""
-    return vehicle.mass * vehicle.arm("fl") * np.minimum(_beyond_roll_out(v, vehicle, dt), 0.0)
-
-
-def _beyond_roll_out(v: FloatArray, vehicle: Vehicle, dt: float) -> FloatArray:
-    return np.minimum(np.gradient(smooth(v, dt, SPEED_S), dt), A_MOST) + roll_out(v, vehicle)
 
 
 def road_wheel_angle(

@@ -52,6 +52,7 @@ _SHARED = "The extended model has what all drives share, not what some have alon
 # kept 0.13 to 1.8 of it, two wrong ones beside measured noise -0.3 and 0.0 (S)
 KEPT = 0.1
 _MOVES = {"v_x": ("v_x",), "wheel speeds": [f"omega_{w}" for w in WHEELS], "a_x": ("a_x",)}
+LEAST_LATE_S = 0.1  # [s] asked about where more than noise is left
 SAME = 0.2  # of what a signal changes by from sample to sample, a difference that is rounding
 
 
@@ -81,6 +82,10 @@ def diagnose(
     late = found_late([s for _, s in drives], vehicle, with_known(given, vehicle))
     found = _diagnosed(drives, vehicle, given, holdout, options, tell, Late(doubts=late.doubts))
     left = late.beyond(found.causes)
+    test = found.significance
+    if found.verdict == "no_effect" and not left.causes and test is not None and test.p_value <= options.level:
+        # what is left is so much that noise took it: no effect gains beside it, a straight line of a delay least of all
+        left = found_late([s for _, s in drives], vehicle, with_known(given, vehicle), least=LEAST_LATE_S)
     if found.verdict == "not_testable" or not left.causes:
         return found
     return _diagnosed(drives, vehicle, given, holdout, options, tell, left)

@@ -16,7 +16,7 @@ from aqualog.model.plant import Plant
 from aqualog.model.sensors import Channel
 from aqualog.model.term import Effect, Parameter, Setup
 
-__all__ = ["LANE_TOLERANCES", "STAND_INS", "TOLERANCES"]
+__all__ = ["LANE_TOLERANCES", "STAND_IN", "TOLERANCES"]
 
 
 _Apply = Callable[[Setup, Mapping[str, float], str | None], Setup]
@@ -79,12 +79,8 @@ TOLERANCES: tuple[Effect, ...] = (
 )  # fmt: skip
 
 # the torque that the model needs on a flat road, in place of a missing one: load, wind and slopes are not in it
-# nor does a log without torque say which motor slows the car, or an engine, and by how much
-STAND_INS = (
-    _of("stand_in_torque", "torque in place of a missing one, relative", "-", 0.2, _at_axles("torque_gain"),
-        tuple(AXLES)),
-    _of("slowing_torque", "share of an axle in what slows the car", "-", 0.5, _at_axles("slowing_share"), tuple(AXLES)),
-)  # fmt: skip
+STAND_IN = _of("stand_in_torque", "torque in place of a missing one, relative", "-", 0.2, _at_axles("torque_gain"),
+               tuple(AXLES))  # fmt: skip
 
 # What one lane may differ by from the other lanes, of the size of an effect on all of them: its depth is known to 15 %,
 # and the form of a law makes another error at each depth and speed. From sources, full aquaplaning falls with depth as

@@ -42,8 +42,7 @@ class Course:
     """Inputs of the car according to its log; arrays on an even grid `t` (n,) from 0 [s], finite.
 
     `torque` (4, n) reported net wheel torques [N·m], `steer` (n,) road-wheel angle [rad], `v_x` (n,) reference
-    velocity [m/s], `lanes` the water on the way. `slowing` (n,): torque of all wheels that slows the car and is not in
-    `torque` [N·m], <= 0; the plant's `slowing_share` of it acts.
+    velocity [m/s], `lanes` the water on the way.
     """
 
     t: FloatArray
@@ -53,7 +52,6 @@ class Course:
     lanes: tuple[Lane, ...] = field(default=())
     has_rods: bool = False
     position: FloatArray | None = None
-    slowing: FloatArray | None = None
 
 
 def setup_along(vehicle: Vehicle, course: Course, model: Model) -> Setup:
@@ -158,8 +156,6 @@ def led_truth(setup: Setup, course: Course, *, rate: float = FOLLOW_RATE, step: 
     torque = np.array([
         _undone(course.t, course.torque[i], setup.sensors, f"torque_{w}", fine) for i, w in enumerate(WHEELS)
     ])  # fmt: skip
-    if course.slowing is not None and plant.slowing_share.any():
-        torque += 0.5 * plant.slowing_share[:, None] * np.interp(fine, course.t, course.slowing)
     speed = np.maximum(_undone(course.t, course.v_x, setup.sensors, "v_x", fine), 0.0)
     # the car is where the measured one was: another resistance must not move it along its road
     grade = np.zeros_like(fine)

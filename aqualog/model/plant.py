@@ -50,7 +50,6 @@ class Plant(NamedTuple):
     torsion_stiffness: FloatArray
     torsion_damping: FloatArray
     driveline: FloatArray  # [kg·m²] turns with the mean of both wheels of an axle
-    slowing_share: FloatArray  # of what slows a car whose torque is not known, at the wheel's axle
     preload: FloatArray  # [N·m] friction of the differential, without torque and [-] per torque of the wheel
     locking: FloatArray
     r_w: FloatArray
@@ -112,7 +111,7 @@ _OF_TYRES = (
 )  # fmt: skip
 _ADDED = ("head_wind", "cornering_drag", "warmup_extra", "towed_mass", "leak_start")
 _ADDED_AT_WHEELS = (
-    "slowing_share", "preload", "locking", "radius_growth", "radius_loss", "brake_drag", "slip_slope_drift",
+    "preload", "locking", "radius_growth", "radius_loss", "brake_drag", "slip_slope_drift",
     "relaxation_length", "leak_radius", "leak_slope",
 )  # fmt: skip
 
