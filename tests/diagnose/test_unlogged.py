@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from aqualog.core.notation import WHEELS
-from aqualog.diagnose.drive import prepare
+from aqualog.diagnose.drive import calm, prepare
 from aqualog.diagnose.inputs import brakes_in_torque, brakes_unlogged, needed_torque, roll_out
 from aqualog.model.follow import follow
 from aqualog.model.scenario import Steering
@@ -33,14 +33,18 @@ def test_torque_that_is_needed_meets_resistance_and_acceleration():
 
 
 @pytest.mark.parametrize("pressure", [None, 0.0], ids=["not logged", "a motor brakes"])
-def test_what_slows_the_car_is_left_out_of_a_log_without_torque(pressure):
-    # where brakes are logged, an accelerometer shows roads and offsets while a motor brakes, too
-    drop = TORQUES if pressure is None else [*TORQUES, "a_x"]
-    log = signals(speed=((0.0, 30.0), (40.0, 30.0), (44.0, 18.0), (90.0, 18.0)), drop=drop)
+@pytest.mark.parametrize("has_a_x", [True, False])
+def test_what_slows_the_car_is_left_out_of_a_log_without_torque(pressure, has_a_x):
+    log = signals(
+        speed=((0.0, 30.0), (40.0, 30.0), (44.0, 18.0), (90.0, 18.0)), drop=TORQUES if has_a_x else [*TORQUES, "a_x"]
+    )  # fmt: skip
     d = prepare(changed(log, log.frame.with_columns(brake_pressure=pl.lit(pressure, pl.Float64))), CAR, "a")
-    assert not d.mask[405:435].any()
-    assert d.mask[50:380].all()
-    assert d.mask[480:880].all()
+    shown = calm(d)
+    assert not shown.mask[405:435].any()
+    assert shown.mask[50:380].all()
+    assert shown.mask[480:880].all()
+    # where brakes are logged, an accelerometer shows a road while a motor brakes, too
+    assert d.mask[405:435].all() == (has_a_x and pressure is not None)
     assert any("only driving and rolling out are used" in n for n in d.notes)
 
 

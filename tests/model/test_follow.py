@@ -17,7 +17,7 @@ from aqualog.model.scenario import Scenario
 from aqualog.model.sensors import IDEAL
 from aqualog.model.simulate import assemble, drive_truth, simulate
 from aqualog.model.state import rolling_state
-from aqualog.model.term import Effect, Model, Term
+from aqualog.model.term import Model, Term
 from aqualog.model.tyre import TYRES
 from aqualog.physics.load import G
 from tests.thesis.passes import SEDAN
@@ -248,22 +248,6 @@ def test_twice_the_gain_is_twice_the_torque():
     a = replay(PLANT._replace(torque_gain=np.full(4, 2.0)), t, np.full(t.size, 150.0), split_rear=1.0, v_0=20.0)
     b = replay(PLANT, t, np.full(t.size, 300.0), split_rear=1.0, v_0=20.0)
     np.testing.assert_allclose(a.v_x, b.v_x, rtol=1e-6)
-
-
-def test_a_torque_that_nobody_knows_slows_the_wheels_of_its_axle(made):
-    t, c = made
-    still = np.zeros((4, t.size))
-    slowing = np.full(t.size, -400.0)
-    shares = Effect("slowing", "", "", "test", (), lambda s, _v, _w: s._replace(
-        plant=s.plant._replace(slowing_share=np.array([0.0, 0.0, 0.5, 0.5]))), ())  # fmt: skip
-    along = replace(course(t, c), torque=still, slowing=slowing)
-    without, slowed = (follow(CAR, along, m) for m in (Model(), Model((Term(shares, {}, None),))))
-    for w in WHEELS:
-        torque = (slowed[f"torque_{w}"] - without[f"torque_{w}"])[INSIDE]
-        np.testing.assert_allclose(torque, -100.0 if w[0] == "r" else 0.0, atol=1e-6)
-    # the rear axle turns slower by the slip of its force, C_s = 30 F_z; both by what the car is slower
-    behind, before = ((x["omega_rl"] / x["omega_fl"])[INSIDE] for x in (slowed, without))
-    assert np.abs(behind / before - 1.0 + 200.0 / CAR.r_e("rl") / (30.0 * CAR.mass * G * 0.5)).max() < 3e-4
 
 
 def test_bad_inputs_are_refused():
