@@ -31,6 +31,8 @@ WORTH = 2.0  # tolerances
 # of a scale of the speed or the acceleration without wheel speeds: between ten trips of one car the slope of the one
 # over the change of the other has a standard deviation of 0.02 (D): pitching, filters, hills
 OF_CHANGES, _OF_CHANGES = 0.02, ("velocity_scale", "accelerometer_gain")
+# [s] of the gyro's delay against the steering, where nobody knows the torque that turns the car in (K)
+OF_TURNING = 0.03
 POWER_OF_SPEED = 4.0  # of the speed of full aquaplaning, with which the lost contact goes
 _TURNING = {"a_y", "yaw_rate", "steer_angle"}
 # signals that a place needs
@@ -147,7 +149,7 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         if "steer_angle" in present & set(effect.places):
             untested[f"{effect.name}@steer_angle"] = "no residual compares the steering with the car's turning"
         for where in () if is_sought else asked:
-            room = room_of(effect, where, drives[0].vehicle, wheels=wheels)
+            room = room_of(effect, where, drives[0].vehicle, wheels=wheels, torque=torque)
             is_whole = where not in (*WHEELS, *AXLES) or effect.drive.is_single  # a load may sit at an axle
             alone = apart if effect.belongs == "drive" and is_whole else []
             variants = effect.drive.variants(length)
@@ -164,12 +166,14 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     return tuple(out), untested
 
 
-def room_of(effect: Effect, where: str | None, car: Vehicle, *, wheels: bool) -> float | None:
+def room_of(effect: Effect, where: str | None, car: Vehicle, *, wheels: bool, torque: bool = True) -> float | None:
     """Tolerance of the lost contact of a car whose speed of full aquaplaning was fitted to its passes, by the spread of
-    that speed, and of what shows in changes of the speed alone."""
+    that speed, of what shows in changes of the speed alone, and of a turn into a curve that torque may help."""
     fitted = car.water.get("v_anchor")
     if effect.name == "contact_loss" and fitted is not None and fitted.source in ("calibrated", "measured"):
         return max(POWER_OF_SPEED * fitted.sd / fitted.value, TOLERANCE * effect.parameters[0].smallest)
+    if not torque and (effect.name, where) == ("signal_delay", "yaw_rate"):
+        return OF_TURNING
     return OF_CHANGES if not wheels and effect.name in _OF_CHANGES and where in ("v_x", "a_x") else None
 
 

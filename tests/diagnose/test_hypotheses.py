@@ -8,7 +8,7 @@ import pytest
 from aqualog.core.notation import WHEELS
 from aqualog.diagnose.channels import contrasts
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual, signatures, value_in, with_values
+from aqualog.diagnose.hypotheses import OF_TURNING, Hypothesis, hypotheses, residual, signatures, value_in, with_values
 from aqualog.diagnose.noise import weighing
 from aqualog.diagnose.tolerances import TOLERANCES
 from aqualog.model.effects import EFFECTS
@@ -62,6 +62,9 @@ def test_what_has_no_signal_is_not_asked_about():
     assert not {"payload_mass", "aero_drag", "torque_gain", "head_wind", "relaxation_length"} & keys
     assert untested["payload_mass"] == "no wheel torque in the log"
     assert "stand_in_torque@r" in keys
+    rooms = {h.key: h.room for h in asked if h.effect.name == "signal_delay"}
+    assert rooms["signal_delay@yaw_rate"] == OF_TURNING  # nor does a log say what helps the car into a curve
+    assert rooms["signal_delay@v_x"] is None
     assert {"signal_delay@v_x", "road_grade"} <= keys
     for dropped, lacks in ((["a_x"], False), (["a_x", *(f"torque_{w}" for w in WHEELS)], True)):
         asked, untested = hypotheses([prepare(changed(plain(), plain().frame.drop(dropped)), CAR, "a")], Model())
