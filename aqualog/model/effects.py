@@ -263,7 +263,7 @@ _ALL = [
         (Parameter("gain", "-", 1.0, 0.05, 0.3, 2.0, 0.01, "true over reported",
             DayToDay("inertia", lambda share, *_: share, "torque_gain")),),
         _times(torque_gain="gain"), ("f", "r"), twins=("payload_mass",),
-        drive=DriveSearch((_TORQUE,), places=(None, "f", "r"), tolerance_at={"f": 0.01, "r": 0.01}, of_motors=True),
+        drive=DriveSearch((_TORQUE,), places=(None, "f", "r"), of_motors=True),
     ),
     Effect(
         "trailer", "mass and air drag of a trailer", "A trailer of {mass:.0f} kg was towed.", "caravans 0.5-1.5 t (K)",
