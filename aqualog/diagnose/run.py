@@ -84,7 +84,7 @@ def diagnose(
     left = late.beyond(found.causes)
     test = found.significance
     if found.verdict == "no_effect" and not left.causes and test is not None and test.p_value <= options.level:
-        # what is left is so much that noise took it: no effect gains beside it, a straight line of a delay least of all
+        # noise has taken what is left, and no effect gains beside it, a straight line of a delay least of all
         left = found_late([s for _, s in drives], vehicle, with_known(given, vehicle), least=LEAST_LATE_S)
     if found.verdict == "not_testable" or not left.causes:
         return found

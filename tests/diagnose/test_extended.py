@@ -69,6 +69,7 @@ BALANCE = [
     ("brake_drag", "fl", {"torque": 60.0}),
     ("brake_drag", None, {"torque": 20.0}),
     ("torque_gain", None, {"gain": 0.88}),
+    ("torque_gain", "f", {"gain": 0.8}),
     ("tyre_radius", "f", {"delta": -0.05}),
     ("tyre_radius", "rl", {"delta": -0.08}),
     ("wheel_inertia", "r", {"delta_inertia": 6.0}),

@@ -245,7 +245,9 @@ def test_grade_slows_and_is_not_felt_by_the_accelerometer():
 
 def test_twice_the_gain_is_twice_the_torque():
     t = np.arange(0.0, 4.0, 0.1)
-    a = replay(PLANT._replace(torque_gain=np.full(4, 2.0)), t, np.full(t.size, 150.0), split_rear=1.0, v_0=20.0)
+    a = replay(
+        PLANT._replace(torque_gain=np.array([1.0, 1.0, 2.0, 2.0])), t, np.full(t.size, 150.0), split_rear=1.0, v_0=20.0
+    )
     b = replay(PLANT, t, np.full(t.size, 300.0), split_rear=1.0, v_0=20.0)
     np.testing.assert_allclose(a.v_x, b.v_x, rtol=1e-6)
 
