@@ -3,6 +3,7 @@
 python -m tests.detect.episode_study --passes 300 --first 1000
 python -m tests.detect.episode_study --dry-hours 20 --first 1000
 python -m tests.detect.episode_study --dry-hours 20 --first 1000 --others    # with snow, ice, gravel and damp roads
+python -m tests.detect.episode_study --dry-hours 20 --first 1000 --without-torque
 python -m tests.detect.episode_study --stops 100 --first 1000                # antilock braking into water, and elsewhere
 python -m tests.detect.episode_study --controlled 60 --first 1000           # stability control in water, and on dry road
 python -m tests.detect.episode_study --begins 200 --first 1000              # logs that begin on water
@@ -16,6 +17,7 @@ from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
+import polars.selectors as cs
 
 from aqualog.core.errors import ConfigError
 from aqualog.core.notation import WHEELS
@@ -88,10 +90,12 @@ def one_pass(seed: int, pool) -> Pass | None:
     return Pass(note, tuple(lanes), tuple((e.start_s, e.end_s) for e in found))
 
 
-def dry(name: str, seed: int, pool):
+def dry(name: str, seed: int, pool, without_torque: bool = False):
     """Seconds, episodes of aquaplaning, and warnings of the margin of a dry drive."""
     drawn = draw(name, seed, pool)
     signals = as_signals(simulate(drawn.scenario, drawn.model), vehicle=drawn.believed)
+    if without_torque:
+        signals = replace(signals, frame=signals.frame.drop(cs.starts_with("torque_")))
     found = detect_drive(signals, drawn.believed, samples=False)
     warned = [e for e in found.events if e.detector == "margin"]
     return signals.duration_s, [(drawn.note, e) for e in found.judgement.of("aquaplaning")], warned
@@ -174,12 +178,12 @@ _OTHER_ROADS = ("damp", "snow", "ice", "gravel", "split")
 DRY = tuple(n for n in NUISANCES if not any(road in n for road in _OTHER_ROADS))
 
 
-def alarms(hours: float, first: int, pool, names=DRY):
+def alarms(hours: float, first: int, pool, names=DRY, without_torque: bool = False):
     """Seconds of dry drives, their episodes of aquaplaning, and drives in which the margin warned by situation."""
     seconds, found, by, seed = 0.0, [], Counter(), first
     while seconds < 3600.0 * hours:
         for name in names:
-            t, wrong, warned = dry(name, seed, pool)
+            t, wrong, warned = dry(name, seed, pool, without_torque)
             seconds, found, by[name] = seconds + t, found + wrong, by[name] + bool(warned)
             for note, e in wrong:
                 print(name, seed, note, f"{e.start_s:.1f}-{e.end_s:.1f}", e.decided_by, flush=True)
@@ -192,6 +196,7 @@ def main() -> None:
     parser.add_argument("--passes", type=int, default=0)
     parser.add_argument("--dry-hours", type=float, default=0.0)
     parser.add_argument("--others", action="store_true")
+    parser.add_argument("--without-torque", action="store_true")
     parser.add_argument("--stops", type=int, default=0)
     parser.add_argument("--controlled", type=int, default=0)
     parser.add_argument("--begins", type=int, default=0)
@@ -223,7 +228,7 @@ def main() -> None:
                   f"{np.sum(~np.isnan(partial))}; false: ",
                   [(note, e.start_s, e.decided_by) for _, false, _ in found for note, e in false], flush=True)  # fmt: skip
     if a.dry_hours:
-        seconds, found, by = alarms(a.dry_hours, a.first, pool, NUISANCES if a.others else DRY)
+        seconds, found, by = alarms(a.dry_hours, a.first, pool, NUISANCES if a.others else DRY, a.without_torque)
         print(f"{seconds / 3600.0:.1f} h dry, seeds from {a.first}: {len(found)} episodes of aquaplaning; "
               f"the margin warned in {by.total()} drives {+by}")  # fmt: skip
 

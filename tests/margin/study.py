@@ -4,6 +4,7 @@ python -m tests.margin.study --passes 4000 --first 20000
 python -m tests.margin.study --passes 1000 --first 20000 --foreign     # tests.blind.multibody: other laws
 python -m tests.margin.study --passes 1000 --first 20000 --any-law     # the same, with laws drawn from published forms
 python -m tests.margin.study --snow 120 --first 1620000                # drives on snow under one side: which warn
+python -m tests.margin.study --passes 360 --first 1750000 --without torque    # of logs without signals that begin so
 python -m tests.margin.study --campaigns 100 --first 70000             # of 8 runs, the fastest 15 km/h below it
 """
 
@@ -24,9 +25,9 @@ CELLS = ((-8, 5), (5, 15), (15, 25), (25, 35), (35, 45), (45, 55))  # [km/h]
 ENDS = ("", "_low", "_high", "_q25", "_q75")
 
 
-def outcome(p, after=2.0):
-    """One pass, `after` seconds behind the edge of the water: true distance and `ENDS` [km/h], warned, warned early."""
-    columns = {s: x for s, x in p.columns.items() if not s.startswith("true_")}
+def outcome(p, after=2.0, without=()):
+    """One pass, its signals that begin with one of `without` taken away, `after` seconds behind the edge of the water: true distance and `ENDS` [km/h], warned, warned early."""
+    columns = {s: x for s, x in p.columns.items() if not s.startswith(("true_", *without))}
     piece = DriveStream(p.vehicle, round(p.dt * 1e9), columns, detectors=[MARGIN]).push(columns)
     f, active = piece.features, piece.tracks[0].active
     edge, k = int(p.wet[0] / p.dt), int((p.wet[0] + after) / p.dt)
@@ -35,12 +36,12 @@ def outcome(p, after=2.0):
     return (*(KMH * x for x in (p.v_full - f["v_x_hat"][k], *found)), warned, early)
 
 
-def foretold(make, seed, runs=8):
+def foretold(make, seed, runs=8, without=()):
     """A campaign of passes that never reach it: true speed of full aquaplaning and the foretold one, with its ends."""
     found = []
     for run in range(runs):
         p = make(seed, DRIVETRAINS[seed % 3], distance=AGAIN[:1] * 2, run=run)
-        columns = {s: x for s, x in p.columns.items() if not s.startswith("true_")}
+        columns = {s: x for s, x in p.columns.items() if not s.startswith(("true_", *without))}
         f = DriveStream(p.vehicle, round(p.dt * 1e9), columns, detectors=[MARGIN]).push(columns).features
         lane = slice(int((p.wet[0] + SETTLED_S) / p.dt), int(p.wet[1] / p.dt))
         v, low, high = (f[n][lane] for n in ("v_x_hat", "aquaplaning_margin_low", "aquaplaning_margin_high"))
@@ -69,6 +70,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--foreign", action="store_true")
     parser.add_argument("--any-law", action="store_true")
+    parser.add_argument("--without", nargs="*", default=[])
     parser.add_argument("--passes", type=int, default=600)
     parser.add_argument("--first", type=int, default=20_000)
     for name in ("campaigns", "snow"):
@@ -82,13 +84,13 @@ def main():
         print(f"{a.snow} drives, warned {sum(warned)}, by {DRIVETRAINS}: {[sum(warned[i::3]) for i in range(3)]}")
         return
     if a.campaigns:
-        x = np.array([foretold(make, seed) for seed in range(a.first, a.first + a.campaigns)])
+        x = np.array([foretold(make, seed, without=a.without) for seed in range(a.first, a.first + a.campaigns)])
         true, v, low, high = x[np.isfinite(x[:, 1])].T
         away, held = v - true, np.mean((low <= true) & (true <= high))
         print(f"{len(x)} campaigns, speed given in {v.size}; median error {np.median(np.abs(away)):.1f}, bias "
               f"{np.median(away):+.1f}, 95 % holds {held:.2f}, half width {0.5 * np.median(high - low):.1f} km/h")  # fmt: skip
         return
-    x = np.array([outcome(make(seed, DRIVETRAINS[seed % 3])) for seed in seeds], dtype=float)
+    x = np.array([outcome(make(seed, DRIVETRAINS[seed % 3]), without=a.without) for seed in seeds], dtype=float)
     print("\n".join(lines(x, "any law" if a.any_law else "foreign" if a.foreign else "own")))
     for i, drivetrain in enumerate(DRIVETRAINS):
         print("\n".join(lines(x[np.array(seeds) % 3 == i], drivetrain)))

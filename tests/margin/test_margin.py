@@ -275,13 +275,6 @@ def test_what_a_dry_wheel_shows_is_the_brush(u):
     assert brush_force(np.array([s]), np.ones(1), mu=1.02, C_s=31.0)[0] == pytest.approx(u - 0.0105, rel=1e-9)
 
 
-def test_without_torque_it_does_not_run():
-    """Wheels alone warned on a measured dry road."""
-    signals, _ = drive(CAR, duration_s=8.0, lanes=(), drop=("torque_rl", "torque_rr"))
-    found = {u.detector: u.missing for u in detect_drive(signals, CAR).unavailable}
-    assert found["margin"] == ("torque_rl", "torque_rr")
-
-
 @pytest.mark.parametrize("seed", [1, 4, 7, 10, 13])
 def test_water_under_one_side_of_a_car_with_front_wheel_drive(seed):
     """Its wheels on the other side are those of a dry road, and its drag is half."""

@@ -53,6 +53,17 @@ def test_no_warning_on_a_dry_trip(real_logs, trip):
     assert [e for e in result.events if e.detector.startswith(("joint", "margin"))] == []
 
 
+@pytest.mark.parametrize("trip", ["A11", "A12", "B26"])
+def test_no_warning_on_a_dry_trip_without_torque(real_logs, trip):
+    """A12 is hilly; the others come nearest to a warning."""
+    result, signals = one(real_logs, trip)
+    car = load_vehicle(HERE / "bmw_i3.toml")
+    frame = with_wheels(signals, car, TRIPS.index(trip)).frame.drop("torque_rl", "torque_rr")
+    alone = detect_drive(replace(result.signals, frame=frame), car)
+    assert "margin" in {t.detector for t in alone.tracks}
+    assert not [e for e in alone.events if e.detector == "margin"]
+
+
 def test_a_stopping_wheel_in_a_dry_trip_is_no_joint_warning_but_one_with_resistance_is(real_logs):
     """A spin-down put into trip A11 at 80 km/h or more: by itself, and with 0.4 m/s^2 less on the accelerometer."""
     car = load_vehicle(HERE / "bmw_i3.toml")

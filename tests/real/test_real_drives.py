@@ -44,6 +44,9 @@ def toyota(real_logs):
 def test_toyota_dry_minute_has_no_event(toyota):
     assert toyota.signals.frame.height * toyota.signals.dt == pytest.approx(60.0, abs=0.1)
     assert toyota.events == ()
+    # its a_x is the derivative of a speed: it knows no hills, 7 % apart, by which the front wheels slip
+    assert "margin" in {t.detector for t in toyota.tracks}
+    assert toyota.margin is None
 
 
 def test_toyota_lists_what_needs_torque(toyota):

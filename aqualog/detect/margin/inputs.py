@@ -8,12 +8,13 @@ from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.braking import hold_on, lasting
-from aqualog.detect.detector import Scene
+from aqualog.detect.detector import Scene, missing_balance
 from aqualog.detect.margin.state import Inputs
 from aqualog.features.smoothing import UNSET, lowpass
 from aqualog.physics.load import wheel_loads
+from aqualog.physics.traction import traction_of_one_axle
 
-__all__ = ["Reader"]
+__all__ = ["Reader", "has_balance"]
 
 PAIRS = ((0, 2), (1, 3), (2, 3))  # of `WHEELS`: front and rear of each side, both sides of the rear axle
 V_MIN = 5.0  # [m/s] slower, wheel speeds are too coarse
@@ -28,7 +29,13 @@ HOLD = 0.3  # [s] after it
 TAU_JUMP = 0.1  # [s]
 SHIFT = 1.0  # [s] a gear shift is over by then: jumps that go on are a traction control at work, as on water
 STANDS = 0.25  # [s] a wheel speed that does not change by a bit for longer has stopped coming
+OVERRUN = -0.03  # [-] of all wheels' traction: without torque and brake pressure a car that is slowed by more may brake
 HELD = 0.5  # [s] the same of a torque, while that of the axle's other wheel comes
+
+
+def has_balance(vehicle: Vehicle, scene: Scene) -> bool:
+    """Whether torques say what water costs."""
+    return not missing_balance(vehicle, scene.columns)
 
 
 class Reader:
@@ -49,16 +56,20 @@ class Reader:
         # slow, or it would let through what the noise of the accelerometer makes low: that looked like water
         a, self._a = lowpass(f["a_kin_slow"], self._a, tau=TAU_A, dt=self._dt)
         none = np.full(scene.size, np.nan)
-        u = self._traction(scene)
-        jump = self._jumps(u[0] + u[1], u[2] + u[3])
+        balanced = has_balance(self._vehicle, scene)
+        u = self._traction(scene) if balanced else self._traction_of_car(scene)
+        # without torque a jump is as well one of the drag, where water begins
+        jump = self._jumps(u[0] + u[1], u[2] + u[3]) & balanced
         held = [self._stands(scene, f"torque_{w}", HELD) for w in WHEELS]
         jump |= (held[0] ^ held[1]) | (held[2] ^ held[3])
         with np.errstate(invalid="ignore"):
             rolls = (v > V_MIN) & ~scene.is_braking
             trusted = rolls & (a < A_MOST) & (a > A_LEAST) & ~(np.abs(f["a_y_slow"]) > A_Y_MAX)
+            if not balanced and "brake_pressure" not in f:
+                trusted &= sum(u) > OVERRUN
             known = ~jump & ~(a > HURRY)
             rough = jump | (np.max(np.abs(u), axis=0) > FORCED)
-        R = np.where(trusted & known, f["delta_a_x"], np.nan)
+        R = np.where(trusted & known, f["delta_a_x"], np.nan) if balanced else none
         turning, pairs = [self._turning(scene, w) for w in WHEELS], []
         for one, other in PAIRS:
             front, rear = turning[one], turning[other]
@@ -67,8 +78,9 @@ class Reader:
                 small = np.maximum(np.abs(u[one]), np.abs(u[other])) < U_MOST
             pairs.append(np.where(trusted & small, slip, np.nan))
         # of the torques, not the accelerometer: that is in the resistance too, and its noise would make a slope of them
-        torques = f["delta_a_x"] + scene.columns["a_x"]
-        return Inputs._make((v, torques, R, *pairs, *u, scene.columns["a_x"], rough.astype(float)))
+        a_x = scene.columns.get("a_x", none)
+        torques = f["delta_a_x"] + a_x if balanced else none
+        return Inputs._make((v, torques, R, *pairs, *u, a_x, rough.astype(float)))
 
     def _turning(self, scene: Scene, wheel: str) -> FloatArray | None:
         """Speed of a wheel on the centre line, NaN where its signal stands still. [m/s]"""
@@ -98,14 +110,34 @@ class Reader:
 
     def _traction(self, scene: Scene) -> list[FloatArray]:
         """Torque over lever and load of each wheel; in a curve the outer ones carry more. [-]"""
-        vehicle, f = self._vehicle, scene.f
+        vehicle, f, loads = self._vehicle, scene.f, self._loads(scene)
         none = np.zeros(scene.size)
-        loads = wheel_loads(
-            f["a_kin_slow"], f["a_y_slow"], mass=vehicle.mass, l_f=vehicle.l_f, l_r=vehicle.l_r, h_cg=vehicle.h_cg,
-            track=vehicle.track,
-        )  # fmt: skip
         spin = [vehicle.turning_inertia(w) / (vehicle.arm(w) * vehicle.r_e(w)) * f["a_kin_slow"] for w in WHEELS]
         return [
             (scene.columns.get(f"torque_{w}", none) / vehicle.arm(w) - spin[i]) / np.fmax(loads[i], LOAD_LEAST)
             for i, w in enumerate(WHEELS)
         ]
+
+    def _traction_of_car(self, scene: Scene) -> list[FloatArray]:
+        """The same without torque, by the acceleration: no drag of water is in it, and no grade without `a_x`. [-]"""
+        vehicle, f, loads = self._vehicle, scene.f, self._loads(scene)
+        rear = vehicle.torque_split_rear
+        free = loads[:2] if rear == 1.0 else loads[2:] if rear == 0.0 else np.zeros((2, scene.size))
+        mass = 2.0 * vehicle.inertia_f / vehicle.r_e_f**2 if rear == 1.0 else 2.0 * vehicle.inertia_r / vehicle.r_e_r**2
+        out = []
+        for share, own in ((1.0 - rear, loads[:2]), (rear, loads[2:])):
+            mu = traction_of_one_axle(
+                f.get("a_x_slow", f["a_kin_slow"]), f["a_kin_slow"], f["v_x_hat"], own, free, mass=vehicle.mass,
+                r_w=vehicle.rolling_resistance, drag_area=vehicle.drag_area, air_density=vehicle.air_density,
+                free_wheel_mass=mass,
+            )  # fmt: skip
+            out += list(share * (mu + vehicle.rolling_resistance))
+        return out
+
+    def _loads(self, scene: Scene) -> FloatArray:
+        """Load of each wheel; in a curve the outer ones carry more. [N]"""
+        car = self._vehicle
+        return wheel_loads(
+            scene.f["a_kin_slow"], scene.f["a_y_slow"], mass=car.mass, l_f=car.l_f, l_r=car.l_r, h_cg=car.h_cg,
+            track=car.track,
+        )  # fmt: skip

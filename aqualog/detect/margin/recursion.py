@@ -111,8 +111,8 @@ def _learn(p, m, row, trust):  # type: ignore[no-untyped-def]
         if math.isnan(row[_D + i] + front + rear):
             continue
         away = row[_D + i] - (front - rear) - g[0] - g[1] * (front + rear)
-        late = p.doubt * (front + rear) if math.isnan(row[_R]) else 0.0
-        _learn_line(g, front + rear, away, p.noise_D**2 + row[_VAR + i] + late * late, trust)
+        late, grade = p.doubt * (front + rear) if math.isnan(row[_R]) else 0.0, p.grade if i < 2 else 0.0
+        _learn_line(g, front + rear, away, p.noise_D**2 + row[_VAR + i] + late * late + grade * grade, trust)
 
 
 @part
@@ -174,12 +174,13 @@ def _gather(p, m):  # type: ignore[no-untyped-def]
             late += front + rear if math.isnan(row[_R]) else 0.0
         x[slip], P[slip], x[shake], P[shake] = 0.0, _UNKNOWN, 0.0, _UNKNOWN
         if n >= 3.0:
-            e, h, late = e / n, h / n, p.doubt * late / n
+            e, h, late, grade = e / n, h / n, p.doubt * late / n, p.grade if i < 2 else 0.0
             x[slip] = math.asinh(e / p.scale_D)
             x[shake] = math.log(max(e2 / n - e * e, 0.0) + within / n + _LEAST) - g[5]
             P[shake] = g[6] + rough * rough
             # what shakes on dry road leaves the mean of few samples unsure; a slip within twice of that is none
             noise = math.exp(g[5] + max(min(rough, x[shake]), 0.0)) / (n * p.block)
+            noise += grade * grade
             P[slip] = (g[2] + 2.0 * h * g[3] + h * h * g[4] + late * late + noise) / (
                 p.scale_D**2 + max(e * e - 4.0 * noise, 0.0)
             )

@@ -43,6 +43,7 @@ class FilterParams(NamedTuple):
     slope_r: float
     rolling: float
     friction: float
+    grade: float = 0.0  # [-] of a slip: what an unknown grade makes of it, where no torque says how hard wheels pull
     v_least: float = 11.0  # [m/s] slower, water does nothing that counts
     scale_R: float = 0.1  # [m/s^2] below it a feature is linear, above it logarithmic
     scale_D: float = 5.0e-4  # [-] the same of a slip

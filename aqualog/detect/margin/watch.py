@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,9 +12,19 @@ from aqualog.core.notation import SIDES
 from aqualog.core.records import FloatArray, Margin, Track
 from aqualog.core.vehicle import Vehicle
 from aqualog.detect.braking import lasting
-from aqualog.detect.detector import Detector, Needs, Output, Scene, Setup, missing_balance, missing_wheels, too_slow
+from aqualog.detect.detector import (
+    Detector,
+    Needs,
+    Output,
+    Scene,
+    Setup,
+    missing_balance,
+    missing_drivetrain,
+    missing_wheels,
+    too_slow,
+)
 from aqualog.detect.margin.emissions import emissions_of
-from aqualog.detect.margin.inputs import Reader
+from aqualog.detect.margin.inputs import Reader, has_balance
 from aqualog.detect.margin.recursion import scan
 from aqualog.detect.margin.state import OUTPUTS, Filter, FilterParams
 
@@ -23,21 +34,33 @@ THRESHOLD = 0.25  # [-] dry roads stay below it, and it finds passes 20 km/h awa
 NEAR = 30.0 / 3.6  # [m/s]
 STEP_S = 0.1  # of the filter
 MIN_RATE = 10.0  # [Hz]
+ALONE = 1.5  # by which a warning is stricter without torque: of a probability, what may be left is divided by it
+GRADE = 0.035  # [-] unknown without torque, standard deviation: of hilly roads (K)
 PROBABLE = 0.5  # [-] of water: below it there is no distance
 FEATURES: Mapping[str, str] = {
     "aquaplaning_margin": "median", "aquaplaning_margin_low": "low", "aquaplaning_margin_high": "high",
     "aquaplaning_margin_q25": "q25", "aquaplaning_margin_q75": "q75", "full_speed_expected": "v_full",
     "contact_expected": "contact",
 }  # fmt: skip
-"""Feature -> row of the filter. They have a value where water is probable; `water_probability` has one everywhere."""
+"""Feature -> row of the filter. They have a value where water is probable; `water_probability` has one everywhere.
+Without torque all have one in a warning alone."""
 
 
-def params(vehicle: Vehicle, dt: float) -> FilterParams:
-    """Return the tuning for a car and a sample time [s]."""
+def params(vehicle: Vehicle, dt: float, *, balanced: bool = True) -> FilterParams:
+    """Return the tuning for a car and a sample time [s]; `balanced`: torques say what water costs."""
     block = max(1, round(STEP_S / dt))
-    return FilterParams(
-        block, block * dt, NEAR, vehicle.slip_slope_f, vehicle.slip_slope_r, vehicle.rolling_resistance, vehicle.mu_max
-    )
+    p = FilterParams(
+        block, block * dt, NEAR, vehicle.slip_slope_f, vehicle.slip_slope_r, vehicle.rolling_resistance, vehicle.mu_max,
+    )  # fmt: skip
+    # where nothing is known of drag, shake alone is no sign: torques that change in turn shake wheels, too
+    return p if balanced else p._replace(grade=GRADE * _slip_by_force(vehicle), shakes=math.inf)
+
+
+def _slip_by_force(vehicle: Vehicle) -> float:
+    """Slip of the front axle less that of the rear one that a force of the car's weight would make of dry tyres. [-]"""
+    rear = vehicle.torque_split_rear
+    front = (1.0 - rear) * vehicle.wheelbase / (vehicle.l_r * vehicle.slip_slope_f)
+    return abs(front - rear * vehicle.wheelbase / (vehicle.l_f * vehicle.slip_slope_r))
 
 
 class MarginWatch:
@@ -47,7 +70,7 @@ class MarginWatch:
         vehicle = setup.vehicle
         self._setup = setup
         self._reader = Reader(vehicle, setup.dt)
-        self._params = params(vehicle, setup.dt)
+        self._params, self._alone = (params(vehicle, setup.dt, balanced=x) for x in (True, False))
         self._emissions = emissions_of(vehicle.drivetrain)
         self._state = Filter.new(self._params, self._emissions)
         self._least = 2 * self._params.block + 1
@@ -56,18 +79,22 @@ class MarginWatch:
     def push(self, scene: Scene) -> Output:
         """Take the next piece: one track, the probability that full aquaplaning is less than 30 km/h away. [-]"""
         v = scene.f["v_x_hat"]
-        values, self._state = scan(self._params, self._emissions, self._state, self._reader.push(scene))
+        balanced, setup = has_balance(self._setup.vehicle, scene), self._setup
+        setup = setup if balanced else replace(setup, threshold=setup.detector.scaled(setup.threshold, ALONE))
+        p = self._params if balanced else self._alone
+        values, self._state = scan(p, self._emissions, self._state, self._reader.push(scene))
         values = np.where(np.isnan(v), np.nan, values)
         rows = dict(zip(OUTPUTS, values, strict=True))
         with np.errstate(invalid="ignore"):
-            wet = rows["p_water"] > PROBABLE
-            near = rows["p_near"] > self._setup.threshold
-        active, self._run = lasting(near & (rows["shows"] > 0.0), self._run, least=self._least, stays=near)
+            near = rows["p_near"] > setup.threshold
+            active, self._run = lasting(near & (rows["shows"] > 0.0), self._run, least=self._least, stays=near)
+            wet = rows["p_water"] > PROBABLE if balanced else active
         features = {name: np.where(wet, rows[row], np.nan) for name, row in FEATURES.items()}
         margin = features["aquaplaning_margin"]
         evidence = {"v_x": ("first", v), "margin_min": ("min", margin), "contact_min": ("min", rows["contact"])}
-        track = self._setup.track(rows["p_near"], active)
-        return Output(((track, evidence),), {**features, "water_probability": rows["p_water"]})
+        track = setup.track(rows["p_near"], active)
+        water = rows["p_water"] if balanced else np.where(active, rows["p_water"], np.nan)
+        return Output(((track, evidence),), {**features, "water_probability": water})
 
 
 class Least:
@@ -102,11 +129,10 @@ class Least:
 
 
 def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
-    # without the resistance wheels alone would decide, and on a measured dry road they warned
     has_side = any(not missing_wheels(have, wheels) for wheels in SIDES.values())
     wheels = missing_wheels(have)
-    balance = missing_balance(vehicle, have)
-    return Needs((*(() if has_side else wheels), *balance, *too_slow(rate_hz, MIN_RATE)), tuple(wheels))
+    missing = (*(() if has_side else wheels), *missing_drivetrain(vehicle), *too_slow(rate_hz, MIN_RATE))
+    return Needs(missing, (*wheels, *missing_balance(vehicle, have)))
 
 
 MARGIN = Detector(

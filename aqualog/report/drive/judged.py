@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from aqualog.core.judgement import Episode, EpisodeKind, Judgement
 from aqualog.core.records import Margin
+from aqualog.detect.verdict import UNFIT
 from aqualog.report.sections import Cell, Line
 from aqualog.report.theme import WHEEL_COLOURS
 from aqualog.report.values import KMH, counted, number
@@ -61,14 +62,17 @@ def headline(judgement: Judgement, *, doubted: bool = False, margin: Margin | No
 
     Where no wheel is found afloat, a warning of the `margin` belongs to it.
     """
+    warned = ""
+    if margin is not None and math.isfinite(margin.warned_s):
+        warned = f", but a warning at {margin.warned_s:.1f} s: {_left(margin)} to full aquaplaning"
     if judgement.verdict == "cannot_be_judged":
-        return f"Aquaplaning cannot be judged: {missing_words(judgement.missing)}"
+        # a torque that does not fit misleads the margin, too
+        lost = f"Aquaplaning cannot be judged: {missing_words(judgement.missing)}"
+        return lost if UNFIT in judgement.missing else lost + warned
     wet = judgement.of("aquaplaning")
     full = sum(e.severity == "full" for e in wet)
     many = counted(len(wet), "episode") + (f", {full} full" if full else "")
-    found = f"Aquaplaning: {episode_sentence(wet[0]) if len(wet) == 1 else many}" if wet else "No aquaplaning"
-    if not wet and margin is not None and math.isfinite(margin.warned_s):
-        found += f", but a warning at {margin.warned_s:.1f} s: {_left(margin)} to full aquaplaning"
+    found = f"Aquaplaning: {episode_sentence(wet[0]) if len(wet) == 1 else many}" if wet else f"No aquaplaning{warned}"
     return f"{found}; doubtful, check the inputs first" if doubted else found
 
 
