@@ -38,21 +38,30 @@ def wet():
     return detect_drive(columns, CAR)
 
 
-@pytest.mark.parametrize("drivetrain", DRIVETRAINS)
-def test_it_warns_near_full_aquaplaning_with_a_wider_interval(drivetrain):
-    passes = [own_pass(1_745_000 + k, drivetrain, distance=(-2.0 / KMH, 8.0 / KMH)) for k in range(6)]
-    known, alone = (np.array([outcome(p) for p in some]) for some in (passes, map(without_torque, passes)))
-    true, median, low, high, *_, warned, early = alone.T
-    given = np.isfinite(median)
-    assert warned.sum() >= 5
-    assert not early.any()
-    assert given.sum() >= 5
-    assert ((low <= true) & (true <= high))[given].sum() >= given.sum() - 1
-    assert np.nanmedian(high - low) > 1.2 * np.nanmedian((known[:, 3] - known[:, 2])[given])
+def test_it_warns_near_full_aquaplaning_with_a_wider_interval():
+    wider = []
+    for drivetrain in DRIVETRAINS:
+        passes = [own_pass(1_745_000 + k, drivetrain, distance=(-2.0 / KMH, 8.0 / KMH)) for k in range(6)]
+        known, alone = (np.array([outcome(p) for p in some]) for some in (passes, map(without_torque, passes)))
+        true, median, low, high, *_, warned, early = alone.T
+        given = np.isfinite(median)
+        assert warned.sum() >= 5
+        assert not early.any()
+        assert given.sum() >= 4
+        assert ((low <= true) & (true <= high))[given].sum() >= given.sum() - 1
+        wider.extend((high - low)[given] / (known[:, 3] - known[:, 2])[given])
+    assert np.median(wider) > 1.05
 
 
 def test_a_distance_is_given_in_a_warning_alone(wet):
     assert {u.detector: u.missing for u in wet.limited}["margin"] == ("torque_rl", "torque_rr")
+    blind = DriveStream(
+        CAR, 10_000_000, [*(f"omega_{w}" for w in WHEELS), "v_x", "a_x", "torque_rl"], detectors=[MARGIN]
+    )
+    assert blind.limited[0].missing == ("torque_rr", "brake_pressure")
+    assert DriveStream(CAR, 10_000_000, [f"omega_{w}" for w in WHEELS], detectors=[MARGIN]).unavailable[0].missing == (
+        "a_x",
+    )
     track = next(t for t in wet.tracks if t.detector == "margin")
     assert track.threshold == pytest.approx(0.5)  # of a quarter with torque
     assert track.active.mean() > 0.2
@@ -63,8 +72,8 @@ def test_a_distance_is_given_in_a_warning_alone(wet):
 
 def test_the_headline_of_a_drive_that_cannot_be_judged_has_the_warning(wet):
     words = headline(wet.judgement, margin=wet.margin)
-    assert words.startswith("Aquaplaning cannot be judged: no wheel torque, but a warning at ")
-    assert words.endswith(" to full aquaplaning")
+    assert words.startswith("Aquaplaning cannot be judged: no wheel torque, but a warning from ")
+    assert f"{wet.margin.warned_s:.1f} s on: at the least " in words
     unfit = replace(wet.judgement, missing=("wheel torque that fits mass and acceleration",))
     assert headline(unfit, margin=wet.margin) == f"Aquaplaning cannot be judged: no {unfit.missing[0]}"
 
@@ -90,6 +99,7 @@ def warned(columns, dt, car):
 @pytest.mark.parametrize("car", [CAR, FWD], ids=["rwd", "fwd"])
 def test_a_hill_that_no_signal_knows_is_no_water(car, monkeypatch):
     columns, dt = on_a_hill(car)
+    columns["a_x"] = np.gradient(columns["v_x"], dt)  # as some buses have it: without the grade
     assert not warned(columns, dt, car)
     monkeypatch.setattr(watch, "GRADE", 0.0)
     assert warned(columns, dt, car)
@@ -98,7 +108,8 @@ def test_a_hill_that_no_signal_knows_is_no_water(car, monkeypatch):
 def test_an_accelerometer_knows_the_hill():
     columns, dt = on_a_hill(CAR)
     t, traction = np.arange(columns["v_x"].size) * dt, []
-    for known in ({}, {"a_x": 0.09 * np.cos(0.3 * t) + 0.07 * G * ((t > 40.0) & (t < 60.0))}):
+    flat = {"a_x": np.gradient(columns["v_x"], dt)}
+    for known in (flat, {"a_x": 0.09 * np.cos(0.3 * t) + 0.07 * G * ((t > 40.0) & (t < 60.0))}):
         own = columns | known
         f = FeatureStream(CAR, dt, own).push(own)
         u = Reader(CAR, dt).push(Scene(f, dict.fromkeys(WHEELS, np.zeros(t.size, bool)), own)).u_rl
@@ -151,6 +162,38 @@ def test_traction_by_acceleration_is_that_by_torque_on_a_dry_road(car):
         by_torque, by_car = (getattr(x, name)[200:].mean() for x in seen)
         assert by_car == pytest.approx(by_torque, abs=0.012)
     assert max(seen[1].u_fl[600:1100].mean(), seen[1].u_rl[600:1100].mean()) > 0.05
+
+
+def test_torque_of_one_wheel_alone_is_as_none(wet):
+    columns = {s: wet.signals.array(s) for s in wet.signals.symbols}
+    one = columns | {"torque_rl": np.full(wet.signals.frame.height, 200.0)}
+    found = [
+        DriveStream(CAR, wet.signals.dt_ns, x, detectors=[MARGIN]).push(x).tracks[0].active for x in (columns, one)
+    ]
+    assert found[0].any()
+    assert np.array_equal(*found)
+
+
+@pytest.mark.parametrize(("slows", "counts"), [(True, True), (False, False)])
+def test_a_wheel_that_reads_zero_has_stopped_if_it_slowed_down_before(slows, counts):
+    """A sensor that dies reads 0 at once."""
+    t = np.arange(900) * 0.01
+    v, one = 30.0 + 1e-4 * np.sin(t), np.ones(t.size)
+    front = np.clip(1.0 - (t - 5.0) / 0.3, 0.0, 1.0) if slows else 1.0 * (t < 5.0)
+    front = np.where(front < 0.03, 0.0, front)
+    columns = {"v_x": v, "a_x": 0.0 * one, "a_y": 0.0 * one, "yaw_rate": 0.0 * one, "brake_pressure": 0.0 * one}
+    columns |= {f"omega_{w}": v * (front if w in ("fl", "fr") else one) / CAR.r_e(w) for w in WHEELS}
+    reader, stream, seen = Reader(CAR, 0.01), FeatureStream(CAR, 0.01, columns), []
+    for at in (slice(0, 520), slice(520, 700), slice(700, 900)):
+        piece = {s: x[at] for s, x in columns.items()}
+        f = stream.push(piece)
+        seen.append(reader.push(Scene(f, dict.fromkeys(WHEELS, one[at] < 0.0), piece)).D_l)
+    slip = np.concatenate(seen)
+    assert np.isfinite(slip[t > 6.0]).all() == counts
+    if counts:
+        assert slip[t > 6.0] == pytest.approx(-1.0, abs=0.01)
+    else:
+        assert np.isnan(slip[t > 6.0]).all()
 
 
 def test_pieces_are_the_whole(wet):

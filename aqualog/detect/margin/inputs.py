@@ -30,6 +30,7 @@ TAU_JUMP = 0.1  # [s]
 SHIFT = 1.0  # [s] a gear shift is over by then: jumps that go on are a traction control at work, as on water
 STANDS = 0.25  # [s] a wheel speed that does not change by a bit for longer has stopped coming
 OVERRUN = -0.03  # [-] of all wheels' traction: without torque and brake pressure a car that is slowed by more may brake
+STOPPING = 0.5  # [-] of the car's speed: a wheel that reads 0 after less has stopped
 HELD = 0.5  # [s] the same of a torque, while that of the axle's other wheel comes
 
 
@@ -47,6 +48,7 @@ class Reader:
         self._slow = {"f": UNSET, "r": UNSET}
         self._a = UNSET
         self._left = self._jumping = 0
+        self._before = dict.fromkeys(WHEELS, UNSET)  # speed of each wheel over the car's when it last turned
         self._unchanged = dict.fromkeys((f"{stem}_{w}" for stem in ("omega", "torque") for w in WHEELS), (UNSET, 0))
 
     def push(self, scene: Scene) -> Inputs:
@@ -58,10 +60,10 @@ class Reader:
         none = np.full(scene.size, np.nan)
         balanced = has_balance(self._vehicle, scene)
         u = self._traction(scene) if balanced else self._traction_of_car(scene)
-        # without torque a jump is as well one of the drag, where water begins
-        jump = self._jumps(u[0] + u[1], u[2] + u[3]) & balanced
+        jump = self._jumps(u[0] + u[1], u[2] + u[3])
         held = [self._stands(scene, f"torque_{w}", HELD) for w in WHEELS]
-        jump |= (held[0] ^ held[1]) | (held[2] ^ held[3])
+        # without torque a jump is as well one of the drag, where water begins
+        jump = (jump | (held[0] ^ held[1]) | (held[2] ^ held[3])) & balanced
         with np.errstate(invalid="ignore"):
             rolls = (v > V_MIN) & ~scene.is_braking
             trusted = rolls & (a < A_MOST) & (a > A_LEAST) & ~(np.abs(f["a_y_slow"]) > A_Y_MAX)
@@ -87,7 +89,19 @@ class Reader:
         v = scene.f.get(f"v_line_{wheel}")
         if v is None:
             return None
-        return np.where(self._stands(scene, f"omega_{wheel}", STANDS), np.nan, v)
+        return np.where(self._stands(scene, f"omega_{wheel}", STANDS) & ~self._stopped(scene, wheel), np.nan, v)
+
+    def _stopped(self, scene: Scene, wheel: str) -> BoolArray:
+        """Where a wheel reads 0 because it has stopped: it had lost half of its speed before. A dead sensor has not."""
+        x, v = scene.columns[f"omega_{wheel}"] * self._vehicle.r_e(wheel), scene.f["v_x_hat"]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            turns, ratio = np.abs(x) > 0.0, np.where(v > V_MIN, np.abs(x / v), 1.0)
+        known = np.where(turns, np.arange(1, x.size + 1), 0)
+        last = np.maximum.accumulate(known)
+        before = np.where(last > 0, ratio[np.maximum(last - 1, 0)], self._before[wheel])
+        self._before[wheel] = float(before[-1])
+        stopped: BoolArray = (x == 0.0) & (before < STOPPING)
+        return stopped
 
     def _stands(self, scene: Scene, signal: str, seconds: float) -> BoolArray:
         """Where a signal has not changed by a bit for so long; one that the drive does not have does not change."""

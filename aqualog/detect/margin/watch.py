@@ -20,6 +20,7 @@ from aqualog.detect.detector import (
     Setup,
     missing_balance,
     missing_drivetrain,
+    missing_torques,
     missing_wheels,
     too_slow,
 )
@@ -35,7 +36,7 @@ NEAR = 30.0 / 3.6  # [m/s]
 STEP_S = 0.1  # of the filter
 MIN_RATE = 10.0  # [Hz]
 ALONE = 1.5  # by which a warning is stricter without torque: of a probability, what may be left is divided by it
-GRADE = 0.035  # [-] unknown without torque, standard deviation: of hilly roads (K)
+GRADE = 0.05  # [-] unknown without torque, standard deviation: of hilly roads (K)
 PROBABLE = 0.5  # [-] of water: below it there is no distance
 FEATURES: Mapping[str, str] = {
     "aquaplaning_margin": "median", "aquaplaning_margin_low": "low", "aquaplaning_margin_high": "high",
@@ -131,8 +132,12 @@ class Least:
 def _needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:
     has_side = any(not missing_wheels(have, wheels) for wheels in SIDES.values())
     wheels = missing_wheels(have)
-    missing = (*(() if has_side else wheels), *missing_drivetrain(vehicle), *too_slow(rate_hz, MIN_RATE))
-    return Needs(missing, (*wheels, *missing_balance(vehicle, have)))
+    torques = missing_torques(vehicle, have)
+    # without torque the acceleration says how hard wheels pull, uphill too, and only the pressure whether they brake
+    needed = () if "a_x" in have else ("a_x",)
+    missing = (*(() if has_side else wheels), *missing_drivetrain(vehicle), *needed, *too_slow(rate_hz, MIN_RATE))
+    unknown = ("brake_pressure",) if torques and "brake_pressure" not in have else ()
+    return Needs(missing, (*wheels, *(torques or missing_balance(vehicle, have)), *unknown))
 
 
 MARGIN = Detector(

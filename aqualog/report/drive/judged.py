@@ -64,7 +64,7 @@ def headline(judgement: Judgement, *, doubted: bool = False, margin: Margin | No
     """
     warned = ""
     if margin is not None and math.isfinite(margin.warned_s):
-        warned = f", but a warning at {margin.warned_s:.1f} s: {_left(margin)} to full aquaplaning"
+        warned = f", but a warning from {margin.warned_s:.1f} s on: at the least {_left(margin)} to full aquaplaning"
     if judgement.verdict == "cannot_be_judged":
         # a torque that does not fit misleads the margin, too
         lost = f"Aquaplaning cannot be judged: {missing_words(judgement.missing)}"

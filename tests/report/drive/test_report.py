@@ -163,7 +163,7 @@ def test_no_episode_says_what_was_judged_and_what_was_not(short):
 def test_a_warning_without_an_episode_is_in_the_verdict(short):
     margin = Margin(15.4 / 3.6, (3.0 / 3.6, 41.8 / 3.6), 42.2, 40.8)
     warned = drive_report(replace(fake.with_events(short, ()), margin=margin))
-    first = "No aquaplaning, but a warning at 40.8 s: 15 km/h (3 ... 42) to full aquaplaning"
+    first = "No aquaplaning, but a warning from 40.8 s on: at the least 15 km/h (3 ... 42) to full aquaplaning"
     assert report_text(warned).splitlines()[0] == first
     assert card(replace(fake.with_events(short, ()), margin=margin))[0] == "partial"
     calm = drive_report(replace(fake.with_events(short, ()), margin=replace(margin, warned_s=math.nan)))
