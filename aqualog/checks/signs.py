@@ -32,6 +32,7 @@ LEAST_AGAINST, MOSTLY = 10, 0.5  # windows, and share of those that move, in whi
 MOVING = 3.0  # [m/s] below, wheels stand or go backwards without a sign
 BANKED, LITTLE = 1.0, 0.3  # [m/s^2] a bend on which banks may count, and what is no bend the other way
 OVAL_SHARE = 0.05  # of the drive
+UNLIKE = 0.005  # [-] by which radii of an axle differ (K)
 SLIDING = 0.015  # half of the slip between the axles from which a driver may steer against the turning
 UNDERSTEER = 0.003  # [rad s^2/m] of a car; it only weighs fast driving against slow
 CROSSED = 0.6  # correlation of the differences along both sides: in slow bends the front wheels' longer paths make less
@@ -170,12 +171,22 @@ def witnesses(windows: Windows, speed: FloatArray, *, on_banks: bool = False) ->
     for axle in ("front", "rear"):
         left, right = f"{axle[0]}l", f"{axle[0]}r"
         if left in wheels and right in wheels:
-            found[axle] = v * (wheels[right] - wheels[left]) / car.track
+            found[axle] = v * (wheels[right] - _as_large(wheels[left], wheels[right])) / car.track
     if "latitude" in windows and "longitude" in windows:
         found["course"] = turning_by_course(windows["latitude"], windows["longitude"], v, windows.step_s)
     if not on_banks and any(_is_oval(x) for n, x in found.items() if n != "a_y"):
         found.pop("a_y", None)
     return found
+
+
+def _as_large(left: FloatArray, right: FloatArray) -> FloatArray:
+    """The speed of the left wheel with the radius of the right one, as far as tyres of one size differ: a drive that is
+    mostly straight shows it. Else a changing speed would look like turning. (n,) [m/s]"""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.where(np.abs(left) > MOVING, right / left, np.nan)
+    if not np.isfinite(ratio).any():
+        return left
+    return left * float(np.clip(np.nanmedian(ratio), 1.0 - UNLIKE, 1.0 + UNLIKE))
 
 
 def _is_oval(turning: FloatArray) -> bool:

@@ -167,7 +167,9 @@ class Detection(Result):
         rate, lacks = 1e9 / signals.step_ns, lacking(found)
         return "\n".join([
             f"{self.drive.title}, {found.vehicle_name}: {signals.duration_s:.1f} s at {rate:g} Hz",
-            headline(found.judgement, doubted=bool(found.checks), margin=found.margin),
+            headline(
+                found.judgement, doubted=bool(found.checks), margin=found.margin, duration_s=signals.duration_s
+            ),
             *(f"  {line}" for line in (*lines_of(found.judgement, 4), *margin_lines(found.margin))),
             *([f"  Not judged: {'; '.join(lacks)}"] if lacks else []),
         ])  # fmt: skip

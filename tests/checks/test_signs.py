@@ -175,3 +175,14 @@ def test_wheels_that_stand_and_spin_on_water_do_not_put_the_accelerometer_in_dou
     factor = {"f": np.where(wet, 0.0, 1.0), "r": np.where(wet, spinning, 1.0)}
     wheels = {f"omega_{w}": DRIVE[f"omega_{w}"] * factor[w[0]] for w in ("fl", "fr", "rl", "rr")}
     assert not [r for r in look(signals(DRIVE | wheels), CAR) if "a_x" in r.signals]
+
+
+def test_radii_that_differ_are_no_turning_on_a_straight_road():
+    """Where the speed changes, two thousandths between left and right look like curves, front and rear apart."""
+    rng = np.random.default_rng(5)
+    v = 25.0 + smooth(rng, 12_000, 4.0, 5.0)
+    straight = {"t": np.arange(v.size) * DT, "v_x": v, "a_x": np.gradient(v, DT)}
+    straight["a_y"] = 0.02 * rng.standard_normal(v.size)
+    for name, share in zip(WHEELS, (0.0, 0.002, 0.002, 0.0), strict=True):
+        straight[name] = v * (1.0 + share) / CAR.r_e(name[-2:]) + 0.01 * rng.standard_normal(v.size)
+    assert said(straight) == []

@@ -30,6 +30,7 @@ EPISODE_HEADS: Sequence[str | tuple[str, str]] = (
     ("Resistance [m/s²]", "m/s²"), ("Slip [%]", "slip %"), ("Distance [m]", "m"), ("Detections", ""),
     "Decided by",
 )  # fmt: skip
+MOST = 0.9  # of a drive: what is judged of less is said in the first sentence
 _WHEELS = {"fl": "front left", "fr": "front right", "rl": "rear left", "rr": "rear right"}
 # what the joint detectors lack, in a reader's words: beginning of the name -> words
 _LACKS = (
@@ -57,10 +58,13 @@ def level(judgement: Judgement, margin: Margin | None = None) -> str:
     return "full" if any(e.severity == "full" for e in wet) else "partial" if wet or is_warned else "none"
 
 
-def headline(judgement: Judgement, *, doubted: bool = False, margin: Margin | None = None) -> str:
+def headline(
+    judgement: Judgement, *, doubted: bool = False, margin: Margin | None = None, duration_s: float = 0.0
+) -> str:
     """The verdict in one sentence; `doubted` where inputs do not fit each other.
 
-    Where no wheel is found afloat, a warning of the `margin` belongs to it.
+    Where no wheel is found afloat, a warning of the `margin` belongs to it, and how much of the drive's `duration_s`
+    was judged if that is not most of it.
     """
     warned = ""
     if margin is not None and math.isfinite(margin.warned_s):
@@ -72,7 +76,11 @@ def headline(judgement: Judgement, *, doubted: bool = False, margin: Margin | No
     wet = judgement.of("aquaplaning")
     full = sum(e.severity == "full" for e in wet)
     many = counted(len(wet), "episode") + (f", {full} full" if full else "")
-    found = f"Aquaplaning: {episode_sentence(wet[0]) if len(wet) == 1 else many}" if wet else f"No aquaplaning{warned}"
+    part = ""
+    if judgement.judged_s < MOST * duration_s:
+        part = f" in the {number(judgement.judged_s, 1)} of {number(duration_s, 1)} s that can be judged"
+    dry = f"No aquaplaning{part}{warned}"
+    found = f"Aquaplaning: {episode_sentence(wet[0]) if len(wet) == 1 else many}" if wet else dry
     return f"{found}; doubtful, check the inputs first" if doubted else found
 
 

@@ -96,10 +96,11 @@ def drive_report(result: DriveResult, *, is_drawn: bool = False) -> Report:
         *card_lines(judgement, signals.duration_s),
         *([("Not judged:", "; ".join(lacks))] if lacks else []),
     ]
+    verdict = headline(judgement, doubted=bool(result.checks), margin=result.margin, duration_s=signals.duration_s)
     folded = {i for e in judgement.of(*FOLDED) for i in e.events} if len(events) > MOST_TEXT else set()
     sections = [
         Section("", [
-            Headline(headline(judgement, doubted=bool(result.checks), margin=result.margin), answers),
+            Headline(verdict, answers),
             Para(f"{' '.join(judged_by(judgement, signals.duration_s))}\n{result.vehicle_name}: "
                  f"{signals.duration_s:.1f} s at {1e9 / signals.step_ns:g} Hz, {len(signals.symbols)} signals",
                  where="text"),

@@ -16,7 +16,7 @@ import pytest
 import aqualog.report
 from aqualog.core.judgement import Episode, Judgement
 from aqualog.core.records import Margin, Quality, Unavailable
-from aqualog.report.drive.judged import judged_by
+from aqualog.report.drive.judged import headline, judged_by
 from aqualog.report.drive.report import FIRST_EVENTS, MOST_ROWS, detections_line, drive_page, drive_report, event_cells
 from aqualog.report.page import write_page
 from aqualog.report.reduce import POINTS
@@ -149,6 +149,12 @@ def test_resistance_is_shown_where_it_is_all_there_is(sizes, said):
     blind = Judgement("cannot_be_judged", ("omega_fl", "omega_fr"), ("resistance",), tuple(alone))
     assert judged_by(blind, 100.0) == ("Ran:", f"Resistance; no single detector decides by itself; {said}")
     assert "resistance" not in judged_by(replace(blind, ran=("spin_down",)), 100.0)[1]
+
+
+@pytest.mark.parametrize(("judged_s", "part"), [(15.0, " in the 15.0 of 40.0 s that can be judged"), (38.0, "")])
+def test_the_first_sentence_says_if_much_of_the_drive_is_not_judged(judged_s, part):
+    found = Judgement("none", (), ("joint_criteria",), (), judged_s)
+    assert headline(found, duration_s=40.0) == f"No aquaplaning{part}"
 
 
 def test_no_episode_says_what_was_judged_and_what_was_not(short):
