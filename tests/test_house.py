@@ -12,9 +12,9 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 97_486
+MOST_LINES = 97_488
 MOST_FILES = 503
-MOST_TEST_LINES = 72_521
+MOST_TEST_LINES = 72_533
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100

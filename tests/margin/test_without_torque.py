@@ -148,6 +148,18 @@ def test_a_car_that_slows_down_may_brake_where_no_signal_knows_it(brakes, counts
     assert np.isfinite(seen.D_l[t > 5.0]).any() == counts
 
 
+def test_a_wheel_that_loses_half_of_its_speed_is_no_light_braking():
+    t = np.arange(800) * 0.01
+    v, one = 30.0 - 0.6 * np.maximum(t - 4.0, 0.0), np.ones(t.size)
+    columns = {"v_x": v, "a_x": -0.6 * (t > 4.0), "a_y": 0.0 * one, "yaw_rate": 0.0 * one}
+    turns = {w: 1.0 - 0.6 * (t > 4.5) * (w == "fr") for w in WHEELS}
+    columns |= {f"omega_{w}": v * turns[w] / CAR.r_e(w) + 1e-6 * t for w in WHEELS}
+    f = FeatureStream(CAR, 0.01, columns).push(columns)
+    seen = Reader(CAR, 0.01).push(Scene(f, dict.fromkeys(WHEELS, one < 0.0), columns))
+    assert np.isnan(seen.D_r[(t > 4.2) & (t < 4.4)]).all()
+    assert np.isfinite(seen.D_r[t > 5.0]).all()
+
+
 @pytest.mark.parametrize("car", [CAR, FWD, AWD], ids=DRIVETRAINS)
 def test_traction_by_acceleration_is_that_by_torque_on_a_dry_road(car):
     speed = ((0.0, 70.0), (4.0, 70.0), (12.0, 90.0), (16.0, 90.0))

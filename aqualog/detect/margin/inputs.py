@@ -68,7 +68,9 @@ class Reader:
             rolls = (v > V_MIN) & ~scene.is_braking
             trusted = rolls & (a < A_MOST) & (a > A_LEAST) & ~(np.abs(f["a_y_slow"]) > A_Y_MAX)
             if not balanced and "brake_pressure" not in f:
-                trusted &= sum(u) > OVERRUN
+                # a light braking makes no wheel lose half of its speed, water does
+                lost = [f[n] < STOPPING * v for n in ("v_line_fl", "v_line_fr") if n in f]
+                trusted &= (sum(u) > OVERRUN) | np.logical_or.reduce(lost)
             known = ~jump & ~(a > HURRY)
             rough = jump | (np.max(np.abs(u), axis=0) > FORCED)
         R = np.where(trusted & known, f["delta_a_x"], np.nan) if balanced else none
