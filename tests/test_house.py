@@ -12,7 +12,7 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 97_488
+MOST_LINES = 97_485
 MOST_FILES = 503
 MOST_TEST_LINES = 72_533
 MEDIAN_MODULE = 182

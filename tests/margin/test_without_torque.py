@@ -172,7 +172,7 @@ def test_traction_by_acceleration_is_that_by_torque_on_a_dry_road(car):
         seen.append(Reader(car, 0.01).push(Scene(f, dict.fromkeys(WHEELS, np.zeros(1600, bool)), own)))
     for name in ("u_fl", "u_rr"):
         by_torque, by_car = (getattr(x, name)[200:].mean() for x in seen)
-        assert by_car == pytest.approx(by_torque, abs=0.012)
+        assert by_car == pytest.approx(by_torque, abs=0.005)
     assert max(seen[1].u_fl[600:1100].mean(), seen[1].u_rl[600:1100].mean()) > 0.05
 
 

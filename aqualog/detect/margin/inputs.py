@@ -11,7 +11,7 @@ from aqualog.detect.braking import hold_on, lasting
 from aqualog.detect.detector import Scene, missing_balance
 from aqualog.detect.margin.state import Inputs
 from aqualog.features.smoothing import UNSET, lowpass
-from aqualog.physics.load import wheel_loads
+from aqualog.features.stream import loads_of_car
 from aqualog.physics.traction import traction_of_one_axle
 
 __all__ = ["Reader", "has_balance"]
@@ -126,7 +126,8 @@ class Reader:
 
     def _traction(self, scene: Scene) -> list[FloatArray]:
         """Torque over lever and load of each wheel; in a curve the outer ones carry more. [-]"""
-        vehicle, f, loads = self._vehicle, scene.f, self._loads(scene)
+        vehicle, f = self._vehicle, scene.f
+        loads = loads_of_car(vehicle, f["a_kin_slow"], f["a_y_slow"])
         none = np.zeros(scene.size)
         spin = [vehicle.turning_inertia(w) / (vehicle.arm(w) * vehicle.r_e(w)) * f["a_kin_slow"] for w in WHEELS]
         return [
@@ -136,10 +137,14 @@ class Reader:
 
     def _traction_of_car(self, scene: Scene) -> list[FloatArray]:
         """The same without torque, by the acceleration: no drag of water is in it, and no grade without `a_x`. [-]"""
-        vehicle, f, loads = self._vehicle, scene.f, self._loads(scene)
+        vehicle, f = self._vehicle, scene.f
+        loads = loads_of_car(vehicle, f["a_kin_slow"], f["a_y_slow"])
         rear = vehicle.torque_split_rear
-        free = loads[:2] if rear == 1.0 else loads[2:] if rear == 0.0 else np.zeros((2, scene.size))
-        mass = 2.0 * vehicle.inertia_f / vehicle.r_e_f**2 if rear == 1.0 else 2.0 * vehicle.inertia_r / vehicle.r_e_r**2
+        free, mass = np.zeros((2, scene.size)), 0.0  # of an axle that no engine drives
+        if rear in (0.0, 1.0):
+            end = "f" if rear == 1.0 else "r"
+            free = loads[:2] if rear == 1.0 else loads[2:]
+            mass = 2.0 * vehicle.turning_inertia(f"{end}l") / vehicle.r_e(f"{end}l") ** 2
         out = []
         for share, own in ((1.0 - rear, loads[:2]), (rear, loads[2:])):
             mu = traction_of_one_axle(
@@ -147,13 +152,5 @@ class Reader:
                 r_w=vehicle.rolling_resistance, drag_area=vehicle.drag_area, air_density=vehicle.air_density,
                 free_wheel_mass=mass,
             )  # fmt: skip
-            out += list(share * (mu + vehicle.rolling_resistance))
+            out += list(share * mu + vehicle.rolling_resistance * (share > 0.0))  # a torque turns its own wheel, too
         return out
-
-    def _loads(self, scene: Scene) -> FloatArray:
-        """Load of each wheel; in a curve the outer ones carry more. [N]"""
-        car = self._vehicle
-        return wheel_loads(
-            scene.f["a_kin_slow"], scene.f["a_y_slow"], mass=car.mass, l_f=car.l_f, l_r=car.l_r, h_cg=car.h_cg,
-            track=car.track,
-        )  # fmt: skip
