@@ -389,16 +389,20 @@ def _is_same(a: Drive, b: Drive) -> bool:
 
 def accelerometer_defect(drive: Drive) -> Follow | None:
     """How `a_x` is not the car's longitudinal acceleration, by its changes over 2 s against those of dv/dt, braking
-    included; None if it is, or if the speed changes too little for a judgement."""
+    included; None if it is, or if the speed changes too little for a judgement. It follows the velocity or the mean of
+    the wheels' speeds: noise of one of them alone does not show a wrong accelerometer."""
     if "a_x" not in drive.columns:
         return None
+    a, wheels = drive.columns["a_x"], [n for n in drive.columns if n.startswith("omega_")]
     # not the course's target: it leads the simulation of a car that is heavier than its file by more than the speed
-    a, v = drive.columns["a_x"], drive.speed
-    found = follow(a, v, np.isfinite(a) & np.isfinite(v), drive.dt)
-    if found is None or found.motion < LEAST_MOTION:
+    speeds = [drive.speed]
+    if wheels:
+        speeds.append(np.mean([drive.vehicle.r_e(n[-2:]) * drive.columns[n] for n in wheels], axis=0))
+    found = [follow(a, v, np.isfinite(a) & np.isfinite(v), drive.dt) for v in speeds]
+    moved = [f for f in found if f is not None and f.motion >= LEAST_MOTION]
+    if any(f.correlation >= LEAST_CORRELATION and LEAST_GAIN <= f.gain <= MOST_GAIN for f in moved):
         return None
-    wrong = found.correlation < LEAST_CORRELATION or not LEAST_GAIN <= found.gain <= MOST_GAIN
-    return found if wrong else None
+    return max(moved, key=lambda f: f.correlation, default=None)
 
 
 def _unusable(ready: Sequence[Drive], drives: Sequence[tuple[str, Signals]]) -> str:

@@ -57,6 +57,21 @@ def test_a_lag_is_found():
     assert d.lag_s == pytest.approx(0.5, abs=0.1)
 
 
+@pytest.mark.parametrize("own", ["v_x", "omega_"])
+def test_noise_of_one_speed_alone_is_no_defect_of_the_accelerometer(own):
+    """As a velocity from satellites has among houses, or wheels that spin on gravel."""
+    log, rng = plain(), np.random.default_rng(3)
+    noise = np.convolve(rng.normal(size=log.frame.height + 99), np.hanning(100), "valid")
+    noise *= 1.5 / noise.std()
+    scale = 1.0 if own == "v_x" else 1.0 / CAR.r_e("fl")
+    noisy = changed(log, log.frame.with_columns(
+        pl.Series(c, log.array(c) + scale * noise) for c in log.frame.columns if c.startswith(own)
+    ))  # fmt: skip
+    assert accelerometer_defect(prepare(noisy, CAR, "a")) is None
+    wrong = changed(noisy, noisy.frame.with_columns(-pl.col("a_x")))
+    assert accelerometer_defect(prepare(wrong, CAR, "a")) is not None
+
+
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_stretches_that_the_torque_does_not_explain_count_too(sign):
     log = plain()
