@@ -11,8 +11,9 @@ What is noise in a measured signal is what a second signal or its own neighbourh
 | lateral accelerometer | velocity times yaw rate (least squares) | 4 s |
 
 Samples beyond six robust standard deviations, such as steps of the pedal, are cut to them. What is slower than four seconds
-(slopes of the road, drifts) stays out, since in a null it would be an effect; so does hard driving (2 m/s² and more). All signals of a source come from the same
-moment, so noise that they share is kept. A piece that is too short goes on backwards; between samples runs a line, so that a
+(slopes of the road, drifts) stays out, since in a null it would be an effect; so does hard driving (2 m/s² and more). The signals of a source come from the same
+moment, so noise that they share is kept. Torque alone is of another one: what a pedal does within 0.7 s is motion. The accelerometer
+shows it, but the wheels, whose mean is taken off, do not, as if their forces built up slowly. A piece that is too short goes on backwards; between samples runs a line, so that a
 10 Hz source has no noise above 5 Hz.
 """
 
@@ -95,10 +96,10 @@ def added(
 ) -> dict[str, FloatArray]:
     """Signals (n,) at the step `dt` with noise: each of the first source that has it."""
     n = len(next(iter(columns.values())))
-    starts = [int(rng.integers(len(next(iter(x.columns.values()))))) for x in noises]
+    motion, torque = ([int(rng.integers(len(next(iter(x.columns.values()))))) for x in noises] for _ in range(2))
     out = dict(columns)
     for name, x in columns.items():
-        for noise, start in zip(noises, starts, strict=True):
+        for noise, start in zip(noises, torque if name.startswith("torque") else motion, strict=True):
             like = name if name in noise.columns else _LIKE.get(name, "")
             if like in noise.columns:
                 share = 0.5 if like != name else 1.0  # of an axle's torque
