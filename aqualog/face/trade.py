@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -153,7 +153,7 @@ def tyre_test(
     from aqualog.config.trade import load_coefficients, load_limits
     from aqualog.trade.evaluation import Options, check_control, entries_of, evaluated
     from aqualog.trade.limits import defaults
-    from aqualog.trade.logs import Request, measure_logs, names_of_runs
+    from aqualog.trade.logs import Request, copies_in, measure_logs, names_of_runs
 
     hear, test_kind = listener(progress), kind_of(kind)
     dbc, jobs = of_kind.pop("dbc", ()), of_kind.pop("jobs", None)
@@ -177,7 +177,11 @@ def tyre_test(
     failed = {names[i]: m for i, m in measured.items() if isinstance(m, str)}
     for name, reason in failed.items():
         hear.failed(name, reason)
-    found = evaluated(entries_of(campaign, names, measured, keys), options, failed)
+    copies = {i: k for i, k in copies_in(campaign).items() if not isinstance(measured[i], str)}
+    once = {i: m for i, m in measured.items() if i not in copies}
+    twice = tuple(f"{names[i]} is the same log as {names[k]}: it counts once" for i, k in sorted(copies.items()))
+    found = evaluated(entries_of(campaign, names, once, keys), options, failed)
+    found = replace(found, notes=(*found.notes, *twice))
     return TyreTest(
         found, own.name, has_loss=bool(failed), sources=sources_of(own.sources, limits, coefficients),
     )  # fmt: skip

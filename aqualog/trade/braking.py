@@ -8,10 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aqualog.core.notation import WHEELS
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.physics.load import G
 from aqualog.trade.lane import Span, depth_of, mean_over, spans_of
 from aqualog.trade.limits import BrakingLimits, defaults
+from aqualog.trade.plausible import wrong_speed
 from aqualog.trade.run_checks import longest_gap
 
 __all__ = ["NO_WATER", "Conditions", "Stop", "bfc_of", "stop_between", "stops"]
@@ -19,6 +21,8 @@ __all__ = ["NO_WATER", "Conditions", "Stop", "bfc_of", "stop_between", "stops"]
 NO_WATER = "nothing says that the road was wet: no on_water, no water depth in the log or the campaign"
 _MEAN_S = 0.1  # [s] of the yaw rate and of the deceleration
 _EDGE_S = 0.05  # [s] by which a lane's label may miss a stop's ends
+_BEFORE_S = 1.0  # [s] of rolling before the stop
+_STANDS, _FAST = 1.0, 15.0 / 3.6  # [rad/s] a wheel that turns by less stands; [m/s] below, ABS lets it
 _ZERO_CELSIUS = 273.15  # [K]
 
 
@@ -195,10 +199,39 @@ def _reasons(
             f"the deceleration stays below {100 * limits.dip:.0f} % of its mean for {longest:.2f} s: the brake was let "
             "go"
         )
+    reasons += _of_brakes(signals, v, stop, inside, limits)
     yaw = mean_over(signals.array("yaw_rate"), _MEAN_S, dt)[inside]
     if np.isfinite(yaw).any() and float(np.nanmax(np.abs(yaw))) > limits.yaw_rate:
         most = float(np.nanmax(np.abs(yaw)))
         reasons.append(f"the yaw rate reaches {most:.2f} rad/s, at most {limits.yaw_rate:g} allowed")
+    return reasons
+
+
+def _of_brakes(
+    signals: Signals, v: FloatArray, stop: Stop, inside: BoolArray, limits: BrakingLimits
+) -> Sequence[str]:  # fmt: skip
+    """Why a stop is not one with ABS at full pressure, by the wheel speeds and the pressure that the log has."""
+    t, reasons = signals.array("t"), []
+    if wrong := wrong_speed(signals, (t >= stop.start_s - _BEFORE_S) & (t < stop.start_s)):
+        reasons.append(wrong)
+    if stop.bfc > limits.bfc_most:
+        reasons.append(f"a coefficient of {stop.bfc:.2f}: no tyre has more than {limits.bfc_most:g}; check v_x's unit")
+    fast = inside & (v > _FAST)
+    for wheel in WHEELS:
+        stands = fast & (np.abs(signals.array(f"omega_{wheel}")) < _STANDS)
+        longest = longest_gap(np.where(stands, np.nan, 0.0), inside) * signals.dt
+        if longest > limits.locked:
+            reasons.append(f"wheel {wheel} stands for {longest:.2f} s: ABS did not control it")
+            break
+    pressure = mean_over(signals.array("brake_pressure"), _MEAN_S, signals.dt)[inside]
+    if (pressure > 0.0).any():
+        highest = np.fmax.accumulate(pressure)
+        longest = (
+            longest_gap(np.where(pressure < limits.dip * highest, np.nan, 0.0), np.isfinite(pressure)) * signals.dt
+        )
+        if longest > limits.dip_lasts:
+            share = 100.0 * float(np.nanmin(pressure / highest))
+            reasons.append(f"the brake pressure falls to {share:.0f} % for {longest:.2f} s: the brake was let go")
     return reasons
 
 

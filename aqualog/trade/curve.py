@@ -10,6 +10,7 @@ import numpy as np
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.trade.lane import Span, mean_over, no_lane, spans_of
 from aqualog.trade.limits import CurveLimits, defaults
+from aqualog.trade.plausible import wrong_curve, wrong_speed
 
 __all__ = ["CurvePass", "curve_pass", "curve_passes"]
 
@@ -30,6 +31,11 @@ class CurvePass:
         and mean in the trough. [m/s²]
     radius : float
         Of the path in the dry second, v^2 / a_y. [m]
+    off : float
+        a_y less v_x times yaw_rate in the dry second, towards the centre: an offset of the sensor, or the body's roll.
+        [m/s²] NaN without a yaw rate.
+    per_delay : float
+        By how much `a_y_mean` grows with a delay of a_y: what lasts from dry road enters the trough. [m/s² per s]
     steer : float
         Largest change of the steering angle in the trough, relative to the dry second. [-] NaN without a steering
         angle.
@@ -44,6 +50,8 @@ class CurvePass:
     a_y_least: float = math.nan
     a_y_mean: float = math.nan
     radius: float = math.nan
+    off: float = math.nan
+    per_delay: float = math.nan
     steer: float = math.nan
     reasons: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -105,12 +113,16 @@ def curve_pass(
     a_y_dry = float(np.nanmean(a_y[before]))
     inwards = 1.0 if a_y_dry >= 0.0 else -1.0
     mean = mean_over(inwards * a_y, limits.a_y_mean, dt)[inside]
+    yaw, a_y_mean = signals.array("yaw_rate")[before], float(np.nanmean(inwards * a_y[inside]))
+    turning = float(np.nanmean(v[before] * yaw)) if np.isfinite(v[before] * yaw).any() else math.nan
     found = replace(
         bare,
         v_entry=float(np.nanmean(v[before])),
         a_y_dry=abs(a_y_dry),
         a_y_least=float(np.nanmin(mean)) if np.isfinite(mean).any() else math.nan,
-        a_y_mean=float(np.nanmean(inwards * a_y[inside])),
+        a_y_mean=a_y_mean,
+        off=abs(a_y_dry) - inwards * turning,
+        per_delay=(abs(a_y_dry) - a_y_mean) / (inside.sum() * dt),
         radius=float(np.nanmean(v[before])) ** 2 / max(abs(a_y_dry), 1e-9),
     )
     return _checked(found, signals, v, before, inside, limits, radius)
@@ -131,6 +143,7 @@ def _checked(
                 f"{found.a_y_dry:.2f} m/s² before the trough; {3.6 * found.v_entry:.0f} km/h on {radius:g} m give "
                 f"{wanted:.2f}"
             )
+    reasons += [why for why in (wrong_speed(signals, before), wrong_curve(signals, before)) if why]
     change = float(np.nanmax(v[before]) - np.nanmin(v[before])) * 3.6
     if change > limits.v_change:
         reasons.append(f"the speed changes by {change:.1f} km/h in the second before, at most {limits.v_change:g}")
@@ -143,6 +156,6 @@ def _checked(
     away = np.abs((smooth if np.isfinite(smooth).any() else steer[inside]) - dry)
     share = float(np.nanmax(away)) / abs(dry) if dry else math.inf
     if share > limits.steer:
-        told = f"by {100 * share:.0f} %" if share < 10.0 else "to more than ten times of it"
-        reasons.append(f"the steering angle changes {told} in the trough: it is not constant")
+        told = f"changes by {100 * share:.0f} %" if share < 10.0 else "grows more than tenfold"
+        reasons.append(f"the steering angle {told} in the trough: it is not constant")
     return replace(found, steer=share, reasons=tuple(reasons), notes=tuple(notes))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aqualog.core.intervals import NOWHERE, Interval, widened
 from aqualog.core.records import FloatArray
@@ -27,6 +28,8 @@ RESULTS: dict[CurveResult, tuple[str, str]] = {
 """Unit and meaning of the number that is compared between sets."""
 DRAWS = 400
 SEED = 4_711
+_OFF = 0.02  # [m/s²] less changes no index by a point
+_DELAY_S = 0.03  # [s] of the filter in a series sensor (K), as an example
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +69,24 @@ class CurveSet:
 
 @dataclass(frozen=True, slots=True)
 class _Steps:
-    """Valid passes, by the step of speed that each belongs to."""
+    """Valid passes, by the step of speed and the log that each belongs to."""
 
     step: FloatArray
     v: FloatArray
     least: FloatArray
     mean: FloatArray
     dry: FloatArray
+    log: NDArray[np.int64]
+
+    @property
+    def drives(self) -> int:
+        """Number of logs."""
+        return int(np.unique(self.log).size)
+
+    @property
+    def is_clustered(self) -> bool:
+        """Whether logs with several passes can be drawn as a whole."""
+        return 1 < self.drives < self.log.size
 
     def means(self, x: FloatArray) -> FloatArray:
         return np.array([x[self.step == s].mean() for s in np.unique(self.step)])
@@ -86,8 +100,9 @@ def common_speeds(sets: Sequence[Sequence[CurvePass]], limits: CurveLimits) -> I
 
 
 def curve_set(
-    passes: Sequence[CurvePass], limits: CurveLimits, *, result: CurveResult, between: Interval, level: float = 0.95
-) -> CurveSet:
+    passes: Sequence[CurvePass], limits: CurveLimits, *, result: CurveResult, between: Interval, level: float = 0.95,
+    logs: Sequence[str] = (),
+) -> CurveSet:  # fmt: skip
     """Summarise the passes of a set.
 
     Parameters
@@ -100,6 +115,8 @@ def curve_set(
         Common speeds over which `result` is taken. [m/s]
     level : float
         Confidence.
+    logs : sequence of str
+        Of each pass the log that it is in; empty: each in its own.
 
     Notes
     -----
@@ -107,8 +124,12 @@ def curve_set(
     bootstrap draws of the passes of each step, widened by Student's t: degrees of freedom are the passes less the
     steps. Deviations from a step's mean of n passes grow by sqrt(n / (n - 1)), since its mean is its own. A step of one
     pass takes the deviations of the others.
+
+    Passes of one log have its water and its sensor in common. Where two logs and more have several passes, whole logs
+    are drawn, each with its deviations in all steps; the degrees of freedom are the logs less one.
     """
-    good = _steps([p for p in passes if p.valid], limits)
+    names = logs or [str(k) for k in range(len(passes))]
+    good = _steps([p for p in passes if p.valid], limits, [n for n, p in zip(names, passes, strict=True) if p.valid])
     empty = np.zeros(0)
     if not good.v.size:
         return CurveSet(empty, empty, empty, empty, passes=len(passes), notes=("no pass is valid",))
@@ -117,7 +138,7 @@ def curve_set(
     own = _read(v, *curves, good.means(good.dry), limits, result, between)
     draws = _draws(good, v, limits, result, between)
     spread = draws.std(axis=0, ddof=1) if draws.size else np.full(4, np.nan)
-    dof = float(good.v.size - v.size)
+    dof = float(good.drives - 1 if good.is_clustered else good.v.size - v.size)
 
     def interval(k: int) -> Interval:
         seen = draws[np.isfinite(draws[:, k]), k] if draws.size else draws
@@ -128,16 +149,20 @@ def curve_set(
     return CurveSet(
         v, *curves, good.means(good.dry), own[0], interval(0), Estimate(own[0], float(spread[0]) ** 2, dof),
         _within(v, own[1], interval(1)), (own[2], interval(2)), (own[3], interval(3)), len(passes), int(good.v.size),
-        _notes(good, v, own, between, limits, is_low=bool(curves[0][0] <= 0.5 * good.means(good.dry)[0])),
+        (
+            *_notes(good, v, own, between, limits, is_low=bool(curves[0][0] <= 0.5 * good.means(good.dry)[0])),
+            *_sensor_notes([p for p in passes if p.valid]),
+        ),
     )  # fmt: skip
 
 
-def _steps(passes: Sequence[CurvePass], limits: CurveLimits) -> _Steps:
+def _steps(passes: Sequence[CurvePass], limits: CurveLimits, logs: Sequence[str] = ()) -> _Steps:
     def of(name: str) -> FloatArray:
         return np.array([float(getattr(p, name)) for p in passes])
 
     steps = np.array([round(p.v_entry / KMH / limits.speed_step) * limits.speed_step for p in passes])
-    return _Steps(steps, of("v_entry"), of("a_y_least"), of("a_y_mean"), of("a_y_dry"))
+    _, log = np.unique(np.array(logs or [str(k) for k in range(len(passes))]), return_inverse=True)
+    return _Steps(steps, of("v_entry"), of("a_y_least"), of("a_y_mean"), of("a_y_dry"), log.astype(np.int64))
 
 
 def _speeds(passes: Sequence[CurvePass], limits: CurveLimits) -> FloatArray:
@@ -215,11 +240,19 @@ def _draws(good: _Steps, v: FloatArray, limits: CurveLimits, result: CurveResult
             x[m] = (y[m] - y[m].mean()) * math.sqrt(m.size / (m.size - 1.0))
     several = np.concatenate([m for m in members if m.size > 1])
     rng = np.random.default_rng(SEED)
+    of_log = {(int(k), int(s)): np.flatnonzero((good.log == k) & (good.step == s)) for k in good.log for s in steps}
     dry = good.means(good.dry)
     found = []
     for _ in range(DRAWS):
-        drawn = np.concatenate([rng.choice(m if m.size > 1 else several, m.size) for m in members])
         own = np.concatenate(members)
+        drawn = np.concatenate([rng.choice(m if m.size > 1 else several, m.size) for m in members])
+        if good.is_clustered:
+            donor = rng.integers(good.drives, size=good.drives)[good.log[own]]
+            theirs = [of_log[int(k), int(s)] for k, s in zip(donor, good.step[own], strict=True)]
+            drawn = np.array([
+                x if not t.size else t[0] if t.size == 1 else rng.choice(t)
+                for x, t in zip(drawn, theirs, strict=True)
+            ])  # fmt: skip
         made = {n: np.zeros(good.v.size) for n in away}
         for name in away:
             y = getattr(good, name)
@@ -229,6 +262,17 @@ def _draws(good: _Steps, v: FloatArray, limits: CurveLimits, result: CurveResult
             _read(v, *_curves(good, v, made["least"], made["mean"], limits.a_y_zero), dry, limits, result, between)
         )
     return np.array(found)
+
+
+def _sensor_notes(passes: Sequence[CurvePass]) -> list[str]:
+    """What the lateral accelerometer may add to all values."""
+    notes, off = [], float(np.median([p.off for p in passes]))
+    if abs(off) >= _OFF:
+        notes.append(f"a_y is {off:+.2f} m/s² off v_x times yaw_rate on the dry circle: an offset, or body roll")
+    most = _DELAY_S * max(abs(p.per_delay) for p in passes)
+    if most >= _OFF:
+        notes.append(f"a filter of {1e3 * _DELAY_S:.0f} ms in a_y would make means too large by up to {most:.2f} m/s²")
+    return notes
 
 
 def _notes(

@@ -268,7 +268,8 @@ def _of_curves(test: TradeTest, groups: Mapping[Group, Sequence[int]]) -> TradeT
     between = common_speeds([passes(m) for m in [*planned, *in_a_row]], limits)
 
     def summary(members: Sequence[int], over: Interval = between) -> CurveSet:
-        return curve_set(passes(members), limits, result=options.result, between=over)
+        logs = [test.entries[i].log for i in members if isinstance(test.entries[i].found, CurvePass)]
+        return curve_set(passes(members), limits, result=options.result, between=over, logs=logs)
 
     rows = []
     for g, m in groups.items():
@@ -305,6 +306,10 @@ def _indexed(test: TradeTest, rows: Sequence[SetRow], made: _Made) -> TradeTest:
     notes = [] if controls else [f"no valid run of the control {options.control}: no index"]
     if any(len(c.control.blocks) == 1 for c in controls):
         notes.append(f"{options.control} was driven once: its drift is not known, and the index holds it constant")
+    drifts = [c.drift.change for c in controls if c.drift is not None]
+    if drifts:
+        most = 100.0 * max(drifts, key=abs)
+        notes.append(f"the values of the sets hold the control's drift ({most:+.1f} %), the index does not")
     return replace(test, sets=tuple(indexed), controls=controls, notes=tuple(notes))
 
 

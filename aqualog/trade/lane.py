@@ -50,6 +50,9 @@ def spans_of(signals: Signals, given: Span | None = None, least: float = LEAST_S
 def no_lane(signals: Signals) -> str:
     """Return why a drive has no stretch on water: none at all, or one that is too short."""
     longest = max((b - a for a, b in spans_of(signals, least=0.0)), default=math.nan)
+    label = signals.array("on_water")
+    if not longest >= 0.0 and np.isfinite(label).any():
+        return f"on_water is never 1 in the log, which ends at {float(signals.array('t')[-1]):.1f} s"
     return f"the water in the log lasts {longest:.2f} s, a lane at least {LEAST_S:g} s" if longest >= 0.0 else NO_LANE
 
 

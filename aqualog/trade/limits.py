@@ -47,6 +47,7 @@ class StraightLimits:
     torque_cut: float
     a_x_least: float
     lost: float
+    v_x_share: float
 
     @property
     def level(self) -> str:
@@ -84,6 +85,8 @@ class BrakingLimits:
     yaw_rate: float
     lost: float
     bfc_share: float
+    bfc_most: float
+    locked: float
     depth_low: float
     depth_high: float
     temperature: float

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -14,13 +15,14 @@ from polars.exceptions import PanicException
 from aqualog.align.load import load_signals
 from aqualog.align.mapping import SignalMap
 from aqualog.campaign.batch import CRASHED
-from aqualog.campaign.definition import Run, with_load
+from aqualog.campaign.definition import Campaign, Run, with_load
 from aqualog.campaign.jobs import Configured, name_of
 from aqualog.core.errors import AqualogError
 from aqualog.core.records import Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.evaluate.labels import disputed
 from aqualog.guard.worker import Crashed, work_on
+from aqualog.io.fingerprint import Contents
 from aqualog.trade.braking import Conditions, Stop, stops
 from aqualog.trade.curve import curve_passes
 from aqualog.trade.entry import Kind, Record
@@ -29,7 +31,7 @@ from aqualog.trade.limits import Limits
 from aqualog.trade.onset import Onset, onset_of
 from aqualog.trade.straight import straight_runs
 
-__all__ = ["Measured", "Request", "measure_log", "measure_logs", "measure_signals", "names_of_runs"]
+__all__ = ["Measured", "Request", "copies_in", "measure_log", "measure_logs", "measure_signals", "names_of_runs"]
 
 _DEPTHS = ("water_depth_left_mm", "water_depth_mm")
 _OPTIONAL = {"straight": frozenset({"v_x"})}  # mapped signals that a log may lack: another one stands in
@@ -139,6 +141,26 @@ def measure_logs(
         for index, task in tasks.items():
             record(index, measure_log(*task))
     return {index: found[index] for index in sorted(found)}
+
+
+def copies_in(campaign: Campaign) -> dict[int, int]:
+    """Return the runs whose logs have the content of an earlier run's on the same lane, each with that run's number.
+
+    Only logs of one size are read for it. A log that cannot be read is nobody's copy.
+    """
+    by_size: dict[tuple[object, ...], list[int]] = {}
+    for index, run in enumerate(campaign.runs):
+        with suppress(OSError):
+            by_size.setdefault((run.lane, *(p.stat().st_size for p in run.logs)), []).append(index)
+    contents, found = Contents(), dict[int, int]()
+    for alike in (runs for runs in by_size.values() if len(runs) > 1):
+        first: dict[tuple[str, ...], int] = {}
+        for index in alike:
+            with suppress(OSError):
+                key = tuple(contents.of(p) for p in campaign.runs[index].logs)
+                if (own := first.setdefault(key, index)) != index:
+                    found[index] = own
+    return found
 
 
 def names_of_runs(configured: Configured) -> list[str]:

@@ -58,8 +58,9 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
     if gap > limits.lost:
         reasons.append(f"wheel speeds are missing for {gap:.2f} s {where}")
     if run.is_crossing and (came := t_stop - run.span[0]) < limits.entry:
+        why = "the car entered it too fast" if came >= -limits.dry_gap else "the wheel spun before the water"
         when = f"{abs(came):.2f} s {'after' if came >= 0.0 else 'before'} the lane began"
-        reasons.append(f"{limits.level} came {when}: the car entered it too fast")
+        reasons.append(f"{limits.level} came {when}: {why}")
     if run.is_crossing and not np.isfinite(run.v[int(run.stop) : int(run.stop) + 2]).all():
         reasons.append("the speed is missing at the crossing")
     begin = max(t_stop - limits.a_x_window, run.span[0] - limits.dry_gap - limits.dry)
@@ -89,7 +90,10 @@ def look(signals: Signals, run: Looked, limits: StraightLimits) -> Seen:
         notes.append("no torque of the driven wheels: whether it was cut is not checked")
     elif fall > limits.torque_cut:
         by = f"by {100 * fall:.0f} %" if fall < 1.0 else "below zero"
-        reasons.append(f"the torque falls {by} within a second {where}: it was cut")
+        gear = signals.array("gear")[driven]
+        gear = gear[np.isfinite(gear)]
+        why = "in a gear shift" if gear.size and np.ptp(gear) > 0.0 else "it was cut"
+        reasons.append(f"the torque falls {by} within a second {where}: {why}")
     wet = min((t_stop - run.span[0]) / (t_stop - begin), 1.0) if t_stop > begin else math.nan
     return Seen(tuple(reasons), tuple(notes), a_x, wet, largest)
 

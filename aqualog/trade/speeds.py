@@ -39,7 +39,7 @@ APART = 1.0 / 3.6  # [m/s] references that differ by more are remarked
 class Speeds(NamedTuple):
     """Speed by the reference and by the other one (n,) [m/s], NaN where unknown; their names, the first empty where
     there is no speed. `notes`: what is to be said of them, or why a speed is missing. `late`: delay of `v_x` that was
-    taken off, NaN if none was. [s]
+    taken off, NaN if none was. [s] `wrong`: why they cannot both be right; empty if they can.
     """
 
     own: FloatArray
@@ -47,12 +47,15 @@ class Speeds(NamedTuple):
     names: tuple[str, str]
     notes: tuple[str, ...] = ()
     late: float = math.nan
+    wrong: str = ""
 
 
 def references(
-    signals: Signals, vehicle: Vehicle, axle: str, dry: str, on_lane: BoolArray, before: BoolArray
+    signals: Signals, vehicle: Vehicle, axle: str, dry: str, on_lane: BoolArray, before: BoolArray, share: float
 ) -> Speeds:
     """Return the speeds of a run whose driven axle is `axle` and whose driven wheel on the dry side is `dry`.
+
+    `share`: of the free wheel's speed, by which `v_x` may differ from it on the lane at the most. [-]
 
     `v_x` is the reference. The free wheel fills its gaps, with the ratio of both that the run shows about them. It
     stands for the speed where the lane has no `v_x`, by that ratio too, or by its radius where the log has no `v_x`.
@@ -74,8 +77,19 @@ def references(
         v_x = earlier(v_x, late if math.isfinite(late) else 0.0, signals.dt)
         apart = float(np.nanmedian(np.abs(v_x - by_wheel)[on_lane]))
         more = f"v_x and {free} differ by {3.6 * apart:.1f} km/h on the lane" if apart > APART else ""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = float(np.nanmedian((v_x / by_wheel)[on_lane]))
+        wrong = f"v_x is {ratio:.2f} times the speed of the free wheel {free} with a radius of {radius:.3f} m: "
+        wrong = f"{wrong}check units, scales and wheels.r_e_{free[-2]}" if abs(ratio - 1.0) > share else ""
         own = np.where(np.isfinite(v_x), v_x, _at_ratio(v_x, by_wheel, known, signals.dt))
-        return Speeds(own, by_wheel, ("v_x", free), tuple(x for x in (note, unsure, filled, more) if x), late)
+        return Speeds(
+            own,
+            by_wheel,
+            ("v_x", free),
+            tuple(x for x in (note, unsure, filled, "" if wrong else more) if x),
+            late,
+            wrong,
+        )
     if has_free:
         own = _at_ratio(v_x, by_wheel, _known(signals, on_lane, before), signals.dt)
         what = f"no v_x on the lane: the speed is that of the free wheel {free}"

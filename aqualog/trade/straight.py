@@ -16,8 +16,9 @@ from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.trade.lane import Side, Span, mean_over, no_lane, spans_of, tracks_of, wet_side_of
 from aqualog.trade.limits import StraightLimits, defaults
+from aqualog.trade.plausible import wrong_speed
 from aqualog.trade.run_checks import Looked, look
-from aqualog.trade.speeds import references
+from aqualog.trade.speeds import Speeds, references
 
 __all__ = ["LEVELS", "StraightRun", "crossing", "slip_of", "straight_run", "straight_runs"]
 
@@ -28,6 +29,7 @@ _SIDE_S = 0.1  # [s] of the mean that shows the wet side
 _SLIP_LEAST = 0.03  # [-] a wheel that turns faster by less does not show the wet side
 _RATE_LEAST = 10.0  # [Hz] slower, a slip that lasts 0.1 s falls between two samples
 _SHOWN_HZ = 50.0  # of the curve that is kept
+_DELAY_S = 0.1  # [s] of a receiver, as an example
 _OTHER: dict[Side, Side] = {"left": "right", "right": "left"}
 
 
@@ -151,7 +153,7 @@ def straight_run(
     if side is None:
         return replace(bare, reasons=notes)
     wet, dry = (f"{axle}{s[0]}" for s in (side, _OTHER[side]))
-    speeds = references(signals, vehicle, axle, dry, on_lane, before)
+    speeds = references(signals, vehicle, axle, dry, on_lane, before, limits.v_x_share)
     if not speeds.names[0]:
         return replace(bare, wet_side=side, reasons=speeds.notes, notes=notes)
     yaw_term = _yaw_term(signals, vehicle, speeds.own, side)
@@ -180,10 +182,29 @@ def straight_run(
         {n: _read(speeds.own, k) for n, k in levels.items()},
         {n: _read(speeds.other, k) for n, k in levels.items()} if speeds.names[1] else {},
         *speeds.names, math.nan if is_reached else bound,
-        (*((wrong,) if math.isfinite(other) else ()), *seen.reasons),
-        (*notes, *speeds.notes, *seen.notes), seen.a_x, seen.yaw_rate, ratio, _read(t, at), side, axle, span,
-        (speeds.own[on_lane][::every], slip[on_lane][::every]), speeds.late, seen.wet,
+        (*((wrong,) if math.isfinite(other) else ()), *_no_speed(signals, before, speeds.wrong), *seen.reasons),
+        (*notes, *speeds.notes, *seen.notes, *_remarks(signals, span, speeds, seen.a_x)), seen.a_x, seen.yaw_rate,
+        ratio, _read(t, at), side, axle, span, (speeds.own[on_lane][::every], slip[on_lane][::every]), speeds.late,
+        seen.wet,
     )  # fmt: skip
+
+
+def _no_speed(signals: Signals, before: BoolArray, wrong: str) -> tuple[str, ...]:
+    """Return why `v_x` is not the car's speed."""
+    why = wrong_speed(signals, before) or wrong
+    return (why,) if why else ()
+
+
+def _remarks(signals: Signals, span: Span, speeds: Speeds, a_x: float) -> tuple[str, ...]:
+    """Return what a reader should know of the log's end, and of a delay that nothing shows."""
+    out = []
+    if float(signals.array("t")[-1]) < span[1] + 0.5 * signals.dt:
+        out.append("the log ends on the lane")
+    if speeds.names == ("v_x", "") and math.isfinite(a_x):
+        out.append(
+            f"the delay of v_x is not known: {_DELAY_S:g} s would make it {3.6 * _DELAY_S * a_x:.1f} km/h too low"
+        )
+    return tuple(out)
 
 
 def slip_of(

@@ -1,6 +1,7 @@
 """The same work by the face and by the command gives the same document, to the character."""
 
 import os
+import shutil
 from pathlib import Path
 
 import polars as pl
@@ -150,6 +151,13 @@ def test_tyre_test(tmp_path):
     assert good.tables["sets"]["valid"].to_list() == [12, 6, 6]
     assert good.tables["sets"]["index"].to_list()[1] > 100.0
     assert "above worn_summer" in repr(good)
+    log = next((tmp_path / "braking").rglob("*.mf4"))
+    copy = shutil.copy(log, tmp_path / "copy.mf4")
+    alone, twice = (
+        aq.tyre_test(x, "braking", vehicle=next((tmp_path / "braking").rglob("vehicle*.toml"))) for x in ([log], [log, copy])
+    )  # fmt: skip
+    assert twice.tables["runs"].height == alone.tables["runs"].height == 1
+    assert any("is the same log as" in n for n in twice.test.notes)
     with pytest.raises(aq.AqualogError, match="does not apply to braking"):
         aq.tyre_test(campaign, "braking", radius=100.0)
     with pytest.raises(aq.AqualogError, match="straight, curve, braking"):

@@ -67,6 +67,13 @@ ODD = {
     "yaw": (drive() | {"yaw_rate": np.where((T > 3.0) & (T < 3.5), 0.4, 0.0)}, "yaw rate reaches 0.40"),
     "no speed": ({"yaw_rate": np.zeros(800)}, "v_x is not in the log"),
     "all NaN": (drive() | {"v_x": np.full(800, np.nan)}, "v_x is not in the log"),
+    "locked": (
+        drive() | {"omega_rr": np.where((T > 2.5) & (T < 3.2), 0.0, drive()["v_x"] / 0.3)},
+        "wheel rr stands for",
+    ),
+    "eased": (drive() | {"brake_pressure": np.where(T < 3.0, 1e7, 2.5e6)}, "the brake pressure falls to 25 % for"),
+    "wrong unit": (drive() | {f"omega_{w}": drive()["v_x"] / 1.08 for w in ("fl", "fr")}, "a radius of 1.08 m"),
+    "no tyre": (drive(15.0), "a coefficient of 1.53: no tyre has more than 1.4"),
     "gap": (drive() | {"v_x": np.where((T > 3.0) & (T < 3.4), np.nan, drive()["v_x"])}, "speed is missing for 0.39 s"),
 }
 
@@ -106,3 +113,12 @@ def test_wet_grip_index_by_hand():
     assert wet_grip_index(0.7, 0.7, 20.0, Coefficients("x", 125.0, -0.4, 20.0, -8.0, 0.7)) == pytest.approx(1.25)
     # 125 * 0.77/0.70 = 137.5; -0.4 * 5 = -2; -8 (0.70/0.68 - 1) = -0.23529
     assert wet_grip_index(0.77, 0.70, 25.0, c) == pytest.approx((137.5 - 2.0 - 0.2352941) / 100.0)
+
+
+def test_a_stop_with_abs_counts():
+    t = T
+    v = drive()["v_x"]
+    cycles = np.where((t > 2.2) & (np.mod(t, 0.4) < 0.15), 0.0, v / 0.3)  # a wheel stands for 0.15 s at a time
+    pressed = np.clip(1e7 * (t - 2.0) / 0.2, 0.0, 1e7) + 5e5 * np.sin(30.0 * t)
+    stop = one(drive() | {f"omega_{w}": cycles for w in ("fl", "fr", "rl", "rr")} | {"brake_pressure": pressed})
+    assert stop.valid, stop.reasons

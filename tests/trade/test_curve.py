@@ -45,7 +45,7 @@ T = np.arange(0.0, 8.0, 0.01)
 ODD = {
     "no steering": (
         changed(steer_angle=np.where(T > 5.2, 0.04, 1e-7)),
-        "changes to more than ten times of it in the trough",
+        "grows more than tenfold in the trough",
     ),
     "steering": (changed(steer_angle=np.where(T > 5.2, 0.04, 0.03)), "steering angle changes by 33 %"),
     "speed": (changed(v_x=80 * KMH + np.where(T < 5.0, T - 4.0, 1.0)), "the speed changes by"),
@@ -57,6 +57,8 @@ ODD = {
     "gap": (changed(a_y=np.where((T > 5.1) & (T < 5.5), np.nan, drive()["a_y"])), "a_y is missing there"),
     "no dry road": (changed(on_water=(T < 6.0).astype(float)), "of dry road before the trough"),
     "all NaN": (changed(a_y=np.full(T.size, np.nan)), "a_y is not in the log"),
+    "km/h": (changed(omega_fl=drive()["v_x"] / 1.1, omega_rr=drive()["v_x"] / 1.1), "a radius of 1.10 m"),
+    "deg/s": (changed(yaw_rate=drive()["a_y"] / drive()["v_x"] * 57.3), "v_x times yaw_rate is 282.96 m/s², a_y 4.94"),
 }
 
 
@@ -188,3 +190,33 @@ def test_a_set_without_valid_passes_and_one_of_single_passes():
     assert "fewer than 3 passes at 60 km/h" in single.notes[0]
     one = curve_set(passes(speeds=(70,)), LIMITS, result="mean", between=(70 * KMH, 70 * KMH))
     assert one.result == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_offset_of_a_y_and_what_its_delay_does_are_remarked(sign):
+    columns = drive(sign=sign)
+    columns["yaw_rate"] = sign * (80 * KMH / 100.0 - 0.1 / (80 * KMH)) * np.ones(T.size)
+    (p,) = curve_passes(signals(columns), radius=100.0)
+    assert p.off == pytest.approx(0.1)
+    late = {**columns, "a_y": np.concatenate([np.full(3, columns["a_y"][0]), columns["a_y"][:-3]])}
+    (q,) = curve_passes(signals(late), radius=100.0)
+    assert q.a_y_mean - p.a_y_mean == pytest.approx(0.03 * p.per_delay, rel=0.15)
+    found = curve_set([p, p], LIMITS, result="mean", between=(80 * KMH, 80 * KMH))
+    assert any("+0.10 m/s² off v_x times yaw_rate" in n for n in found.notes)
+    assert any("a filter of 30 ms in a_y would make means too large by up to 0.1" in n for n in found.notes)
+
+
+def test_passes_of_one_log_are_not_independent():
+    """Six logs with three passes at each speed: what a log has of its own is in all of its passes."""
+    rng, made, logs = np.random.default_rng(8), [], []
+    for log in range(6):
+        own = rng.normal(0.0, 0.1)
+        for kmh in (60, 65, 70, 75, 80):
+            for _ in range(3):
+                a_y = 2.0 + own + rng.normal(0.0, 0.01)
+                made.append(CurvePass(kmh * KMH, 5.0, a_y, a_y, 100.0))
+                logs.append(f"log {log}")
+    alone, together = (curve_set(made, LIMITS, result="mean", between=(60 * KMH, 80 * KMH), logs=x) for x in ([], logs))
+    wide = (together.ci[1] - together.ci[0]) / (alone.ci[1] - alone.ci[0])
+    assert 3.0 < wide < 8.0  # sqrt(15) for fifteen alike ones, times 1.31 for five degrees of freedom
+    assert together.estimate.dof == 5.0

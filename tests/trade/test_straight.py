@@ -295,3 +295,57 @@ def test_limits_of_a_user():
     run = one(straight(), limits=limits)
     assert run.v / KMH == pytest.approx(73.0, abs=0.01)
     assert defaults().straight.slip == 0.15
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        (lambda c: c | {"v_x": 3.6 * c["v_x"]}, "v_x and the wheel speeds give a radius of 1.14 m"),
+        (lambda c: c | {"v_x": 1.05 * c["v_x"]}, "v_x is 1.05 times the speed of the free wheel omega_rr"),
+        (lambda c: c | {w: 9.55 * x for w, x in c.items() if w.startswith("omega")}, "give a radius of 0.03 m"),
+    ],
+)
+def test_a_speed_that_is_not_that_of_the_wheels_does_not_count(change, why):
+    run = one(change(straight()))
+    assert not run.valid
+    assert why in run.reasons[0]
+    assert not any("differ by" in n for n in run.notes)
+
+
+def test_radii_that_are_off_by_three_percent_count():
+    columns = straight()
+    assert one(columns | {"v_x": 1.03 * columns["v_x"]}).valid
+
+
+def test_a_log_that_ends_on_the_lane_is_remarked():
+    cut = {n: x[:900] for n, x in straight(v_15=110.0).items()}
+    run = one(cut)
+    assert run.is_censored
+    assert "the log ends on the lane" in run.notes
+    assert "the log ends on the lane" in one(straight(end=15.0), lane=(3.0, 100.0)).notes
+    assert "the log ends on the lane" not in one(straight()).notes
+
+
+def test_a_wheel_that_spins_long_before_the_water():
+    columns, t = straight(v_0=66.0), np.arange(0.0, 15.0, 0.01)
+    columns["omega_fl"] = np.where((t > 2.5) & (t < 3.3), 1.6, 1.0) * columns["omega_fl"]
+    assert any("before the lane began: the wheel spun before the water" in r for r in one(columns).reasons)
+
+
+def test_a_gear_shift_is_named_where_the_torque_falls():
+    columns, t = straight(), np.arange(0.0, 15.0, 0.01)
+    hole = (t > 5.0) & (t < 5.3)
+    columns |= {f"torque_{w}": np.where(hole, 0.0, columns[f"torque_{w}"]) for w in ("fl", "fr")}
+    assert "it was cut" in one(columns).reasons[0]
+    assert "in a gear shift" in one(columns | {"gear": np.where(t < 5.1, 3.0, 4.0)}).reasons[0]
+
+
+def test_a_label_that_is_never_on_is_no_missing_label():
+    columns = {n: x for n, x in straight().items() if not n.startswith("water")}
+    run = one(columns | {"on_water": np.zeros(1500)})
+    assert run.reasons == ("on_water is never 1 in the log, which ends at 15.0 s",)
+
+
+def test_an_all_wheel_drive_says_what_an_unknown_delay_would_do():
+    run = one(straight(), replace(FWD, drivetrain="awd", torque_split_rear=0.4))
+    assert any("0.1 s would make it 0.5 km/h too low" in n for n in run.notes)

@@ -45,10 +45,12 @@ def value_text(key: str, value: float | str | None, *, is_alone: bool = True) ->
 def group_text(group: Group, *, without: Sequence[str] = ()) -> str:
     """A configuration in one line, without loads of 0 kg."""
     ordered = sorted(group, key=lambda item: item[0] == "vehicle")  # readers look for tyre and pressure first
-    told = [
-        value_text(k, v) for k, v in ordered if k not in without and not (k.startswith("load_") and v in (0.0, None))
-    ]
-    return " · ".join(told) or "all runs"
+    shown = {k: v for k, v in ordered if k not in without and not (k.startswith("load_") and v in (0.0, None))}
+    front, rear = (shown.get(f"pressure_{axle}_bar") for axle in ("front", "rear"))
+    if front is not None and front == rear:
+        shown.pop("pressure_front_bar")
+    by_axle = {"pressure_rear_bar": " rear"} if front is not None and rear is not None and front != rear else {}
+    return " · ".join(value_text(k, v) + by_axle.get(k, "") for k, v in shown.items()) or "all runs"
 
 
 def file_name(index: int, name: str) -> str:

@@ -137,7 +137,7 @@ def _slip(test: TradeTest) -> dict[str, Any] | None:
             left -= 1
             v, slip = f.curve
             name = group_text(s.group)
-            keep = np.flatnonzero(slip < 1.0)
+            keep = np.flatnonzero(slip[: int(np.nanargmax(v)) + 1] < 1.0)  # not the way back, with the throttle let go
             end = int(keep[-1]) + 1 if keep.size else 0
             dash = "solid" if test.entries[i].valid else "dot"
             data.append(line(

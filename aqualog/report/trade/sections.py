@@ -35,6 +35,7 @@ _DRAWN = {
 _NOUNS = {"straight": "run", "curve": "pass", "braking": "stop"}
 _MOST_RUNS = 30  # in a terminal; all of them are in page, CSV and JSON
 _WIDTH = 110  # characters of a line of thresholds
+_LATE_APART = 0.04  # [s]
 _TIED = "\N{NO-BREAK SPACE}"  # between a key, its value and its unit
 _FOOTER = (
     "Intervals: 95 %. Straight and braking: Student's t; censored runs by likelihood [tobin1958]. Curve: bootstrap "
@@ -186,7 +187,7 @@ def _legend(test: TradeTest) -> str:
     o = test.options
     if o.kind == "straight":
         late = [f.late for e in test.entries if isinstance(f := e.found, StraightRun) and math.isfinite(f.late)]
-        told = f"v_x is late by {median(late):.2f} s (median of {len(late)} runs): taken off.\n" if late else ""
+        told = f"v_x is late by {_late_text(late)}: taken off.\n" if late else ""
         level = o.limits.straight.level
         return told + (
             f"v_05, minor spin-down, slip slope: other signs of lost contact, before or after {level}; "
@@ -199,6 +200,14 @@ def _legend(test: TradeTest) -> str:
     low, high = test.between
     span = f"{KMH * low:.0f} to {KMH * high:.0f} km/h" if math.isfinite(low) else "none"
     return f"{o.result}: {RESULTS[o.result][1]} ({span})."
+
+
+def _late_text(late: Sequence[float]) -> str:
+    """Return the delays of runs, with their range where they differ by more than a receiver's scatter."""
+    runs = _several(len(late), _NOUNS["straight"])
+    if max(late) - min(late) > _LATE_APART:
+        return f"{min(late):.2f} to {max(late):.2f} s ({runs}, median {median(late):.2f} s)"
+    return f"{median(late):.2f} s (" + (f"median of {runs})" if len(late) > 1 else f"{runs})")
 
 
 def _control_lines(test: TradeTest) -> list[Line]:

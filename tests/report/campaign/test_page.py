@@ -476,6 +476,10 @@ def test_values_in_words():
     assert value_text("water_depth_mm", 0.0) == "dry"
     assert value_text("tyre", None) == "tyre not given"
     group = (("vehicle", "vehicle_x"), ("tyre", "worn"), ("load_front_kg", 0.0), ("water_depth_mm", 1.3))
+    alike = (("pressure_front_bar", 2.2), ("pressure_rear_bar", 2.2))
+    assert group_text(alike) == "2.2 bar"
+    assert group_text((alike[0], ("pressure_rear_bar", 2.0))) == "2.2 bar front · 2.0 bar rear"
+    assert group_text(alike[1:]) == "2.2 bar"
     assert group_text(group) == "worn · 1.3 mm · x"
     assert page_names(["a", "a"])[0] != page_names(["a", "a"])[1]
     assert Path(page_names([LONG])[0]).suffix == ".html"
