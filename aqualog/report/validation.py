@@ -11,6 +11,7 @@ from aqualog.report.sections import Code, Figures, Headline, Line, Lines, Para, 
 from aqualog.report.validation_figures import validation_figures
 from aqualog.report.values import KMH, counted, fields_of, number, percent, plain, pretty_unit, short
 from aqualog.validate.records import ABSCISSAE, SIGNALS, Limit, Plot, Spread, Validity, Worst
+from aqualog.validate.spread import LEAST_DRIVES
 
 __all__ = ["METHODS", "validation_document", "validation_report"]
 
@@ -94,22 +95,34 @@ def _source(found: Validity, plot: Plot) -> str:
 
 
 def _sentence(found: Validity, method: str, vehicle: str) -> str:
-    head = f"{_OTHER.format(METHODS[method])}: the simulation of {vehicle}"
+    head = f"{_OTHER.format(METHODS[method])}: the simulation of {vehicle} is"
+    bad = [_limit_text(x) for x in found.limits if not x.is_valid]
+    verdict = " and ".join(bad) or "valid at all speeds driven"
     if method == "boundary":
-        said = f"is within the boundaries {percent(found.share)} of the time"
+        said = [f"{head} {verdict}", f"It is within the boundaries {percent(found.share)} of the time"]
+        said[-1] += f" ({percent(found.plan.agreed)} asked for)"
         if found.worst is not None:
-            said += f", farthest beyond them {_worst_text(found.worst, many=len(found.traces) > 1)}"
+            said.append(f"Farthest beyond: {_worst_text(found.worst, many=len(found.traces) > 1)}")
     elif found.rated:
         least = min(found.rated, key=lambda r: r.total)
-        said = f"is rated {found.total:.2f} over {counted(len(found.rated), 'signal')}"
-        said += f", lowest {least.signal} with {least.total:.2f}" if len(found.rated) > 1 else ""
+        said = [f"{head} rated {found.total:.2f} over {counted(len(found.rated), 'signal')}"]
+        said[-1] += f", lowest {least.signal} with {least.total:.2f}" if len(found.rated) > 1 else ""
+        said.append(f"By the boundaries of {METHODS['boundary']} it is {verdict}")
     else:
-        said = "has no rating, because no signal moved enough"
-    bad = [_limit_text(x) for x in found.limits if not x.is_valid]
-    if bad and method == "boundary":
-        bad[-1] += f", where {percent(found.plan.agreed)} of the time is asked for"
-    good = "valid at all speeds driven" if found.limits else ""
-    return f"{head} {said}; {' and '.join(bad) or good}."
+        said = [f"{head} not rated, because no signal moved enough"]
+    return ". ".join((*said, *_basis(found))) + "."
+
+
+def _basis(found: Validity) -> list[str]:
+    """What the tolerances stand on, where it is not the repetitions that the method asks for."""
+    if found.spread:
+        return []
+    drives = len(found.traces)
+    own = "the plan's" if found.plan.given else "built in"
+    if drives >= LEAST_DRIVES:
+        return [f"The tolerances are {own}, since the drives do not repeat each other (length, speed over time)"]
+    asked = f"{counted(drives, 'drive')} of the {LEAST_DRIVES} that the method asks for"
+    return [f"The tolerances are {own}: {asked}, no basis for a release"]
 
 
 def _worst_text(w: Worst, *, many: bool) -> str:

@@ -10,19 +10,22 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from aqualog.align.mapping import MAP_HINT
 from aqualog.core.errors import SignalError
 from aqualog.core.records import BoolArray, FloatArray, Signals
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import block_means, block_step, channel_values
-from aqualog.diagnose.drive import RECOVERY_S, Drive, prepare
+from aqualog.diagnose.drive import A_Y_MAX, RECOVERY_S, Drive, prepare
 from aqualog.diagnose.hypotheses import simulated
+from aqualog.diagnose.inputs import V_MIN
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
+from aqualog.trade.plausible import wrong_speed
 from aqualog.validate.boundary import beyond
 from aqualog.validate.rating import LEAST_SAMPLES, rating
 from aqualog.validate.records import PLOTS, SIGNALS, Judged, Limit, Plan, Plot, Rated, Spread, Trace, Validity, Worst
 from aqualog.validate.sensors import late_velocity, offsets
-from aqualog.validate.spread import LEAST_DRIVES, spread_of
+from aqualog.validate.spread import spread_of
 
 __all__ = ["trace_of", "validate"]
 
@@ -32,6 +35,7 @@ BRIDGED_S = 0.5  # [s] shorter stretches within part no stretch beyond
 LONGEST_S = 60.0  # [s] of a rated stretch
 MOVES = 6.0  # times the built-in eps_y from the least to the greatest value of a stretch that is rated
 LEAST_VALID = 1.0 / 3.6  # [m/s] a range of speed that counts as valid, at least; and a fifth of what was driven
+OFTEN = 0.1  # of a drive with so fast curves that little else is left
 LEAST_BEYOND_S = 2.0  # [s] more than the agreed share allows, before a part of the speeds is not valid
 
 
@@ -64,8 +68,15 @@ def validate(
     """
     traces = []
     for name, signals in drives:
+        if wrong := wrong_speed(signals, np.ones(signals.frame.height, dtype=bool)):
+            raise SignalError(wrong, where=name, hint=MAP_HINT)
         progress(f"{name}: simulating")
         traces.append(trace_of(prepare(signals, vehicle, name, judges_afloat=True), model, signals))
+    if not any(t.judged.any() for t in traces):
+        raise SignalError(
+            f"none of {sum(t.duration_s for t in traces):.0f} s can be judged: {_why_not(*drives[0])}",
+            where=drives[0][0], hint=MAP_HINT,
+        )  # fmt: skip
     spread = {s: w for s in SIGNALS if s not in plan.given and (w := spread_of(traces, s))}
     plan = replace(plan, plots=tuple(_widened(p, spread) for p in plan.plots))
     progress("judging")
@@ -77,17 +88,24 @@ def validate(
     within = sum(float(w[t.judged].sum()) * t.step for t, w in zip(traces, all_in, strict=True))
     worst = [(j.worst, _weight(j.worst, j.plot)) for j in judged if j.worst is not None]
     notes = [f"{t.name}: {n}" for t in traces for n in t.notes]
-    if len(traces) < LEAST_DRIVES:
-        notes.append(f"{len(traces)} of the {LEAST_DRIVES} drives that the method asks for at the least")
-    if len(traces) >= LEAST_DRIVES and not spread:
-        notes.append(
-            "the drives do not repeat each other (length, speed over time): tolerances are built in or the file's"
-        )
+    lateral = [s for s in ("a_y", "yaw_rate") if any(s in t.measured for t in traces)]
+    if lateral:
+        what = "is judged" if len(lateral) == 1 else "are judged"
+        notes.append(f"{' and '.join(lateral)} {what} with an assumed cornering stiffness: no key of the file sets it")
     return Validity(
         tuple(traces), plan, within / seconds if seconds else math.nan, seconds, sum(t.duration_s for t in traces),
         judged, max(worst, key=lambda x: x[1])[0] if worst else None, _limits(traces, all_in, plan.agreed),
         _rated(traces), spread, tuple(notes),
     )  # fmt: skip
+
+
+def _why_not(name: str, signals: Signals) -> str:
+    """Why no part of a drive can be judged, by what is most often the reason."""
+    turning = np.abs(signals.array("v_x") * signals.array("yaw_rate"))
+    most = float(np.nanquantile(turning, 1.0 - OFTEN)) if np.isfinite(turning).any() else 0.0
+    if most > A_Y_MAX:
+        return f"v_x times yaw_rate is {most:.0f} m/s² and more in a tenth of it: is one of their units wrong?"
+    return f"it needs driving above {3.6 * V_MIN:.0f} km/h without braking hard or gaps"
 
 
 def trace_of(drive: Drive, model: Model, signals: Signals) -> Trace:

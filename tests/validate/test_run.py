@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 
 from aqualog.core.errors import SignalError
@@ -38,7 +39,9 @@ def sound():
 def test_a_car_that_is_that_of_the_file_is_valid(sound):
     assert sound.share > 0.99
     assert [x.is_valid for x in sound.limits] == [True]
-    assert sound.notes[-1] == "1 of the 3 drives that the method asks for at the least"
+    assert (
+        sound.notes[-1] == "a_y and yaw_rate are judged with an assumed cornering stiffness: no key of the file sets it"
+    )
     assert {j.plot.y for j in sound.judged} > {"a_x", "slip_fl", "slip_rr"}
     assert all(j.share == 1.0 for j in sound.judged if j.plot.x != "t")
     (a_x,) = (r for r in sound.rated if r.signal == "a_x")
@@ -129,6 +132,9 @@ def repeated(offsets, noise):
     ]  # fmt: skip
 
 
+WIDE = 1.976 * 2.576 / 1.96  # of the noise of one signal alone
+
+
 def test_spread_of_repetitions():
     # means 0, 0.1, 0.2: standard deviation 0.1, and t(0.975, 2) = 4.303; an error that all share is not in it
     assert spread_of(repeated((0.0, 0.1, 0.2), 0.0), "a_x") == pytest.approx(4.303 * 0.1, rel=1e-3)
@@ -145,20 +151,44 @@ def test_spread_of_repetitions():
 
 def test_student_counts_for_what_three_drives_know():
     """The noise is known from thousands of blocks. One of seven signals has a wider one: all must be within at once."""
-    assert spread_of(repeated((0.0, 0.0, 0.0), 0.05), "a_x") == pytest.approx(1.976 * 0.05, rel=0.05)  # dof 147
-    # variances 0.01 and 0.04: dof = 0.05² / (0.01²/2 + 0.04²/147) = 41, t = 2.02
+    # 99 % of the normal distribution are within 2.576
+    assert spread_of(repeated((0.0, 0.0, 0.0), 0.05), "a_x") == pytest.approx(WIDE * 0.05, rel=0.05)  # dof 147
+    # variances 0.01 and 0.069: dof = 0.079² / (0.01²/2 + 0.069²/147) = 76, t = 1.99
     mixed = repeated((0.0, 0.1, 0.2), 0.2)
-    assert spread_of(mixed, "a_x") == pytest.approx(2.02 * math.hypot(0.1, 0.2), rel=0.05)
+    assert spread_of(mixed, "a_x") == pytest.approx(1.99 * math.hypot(0.1, 0.2 * 2.576 / 1.96), rel=0.05)
     many = [replace(t, measured=dict.fromkeys("abcdef", t.measured["a_x"]) | t.measured) for t in mixed]
-    # 1 - 0.025/7 of the normal distribution is at 2.69; 5 % more dof change nothing
-    assert spread_of(many, "a_x") == pytest.approx(1.99 * math.hypot(0.1, 0.2 * 2.69 / 1.96), rel=0.05)
+    # 1 - 0.005/7 of the normal distribution is at 3.19; more dof change nothing
+    assert spread_of(many, "a_x") == pytest.approx(1.98 * math.hypot(0.1, 0.2 * 3.19 / 1.96), rel=0.05)
 
 
 def test_neighbours_of_a_slow_signal_do_not_hide_its_noise():
     slow = [
         replace(t, measured={"a_x": np.repeat(t.measured["a_x"][::10], 10)}) for t in repeated((0.0, 0.0, 0.0), 0.05)
     ]
-    assert spread_of(slow, "a_x") == pytest.approx(1.976 * 0.05, rel=0.15)
+    assert spread_of(slow, "a_x") == pytest.approx(WIDE * 0.05, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    "wrong", [lambda a: 0.2 * a, lambda a: np.interp(np.arange(500) - 5, np.arange(500), a) - a, lambda a: -0.7 * a]
+)
+def test_an_error_that_all_drives_share_is_no_noise(wrong):
+    """A gain, a delay of half a second, a stiffness: what the simulated signal explains must not widen its boundary."""
+    moves = 2.0 * np.sin(2.0 * np.pi * np.arange(500) / 37.0) + np.sin(2.0 * np.pi * np.arange(500) / 17.0)
+    made = [
+        replace(t, measured={"a_x": t.measured["a_x"] + moves + wrong(moves)}, simulated={"a_x": moves})
+        for t in repeated((0.0, 0.0, 0.0), 0.05)
+    ]
+    assert spread_of(made, "a_x") == pytest.approx(WIDE * 0.05, rel=0.06)
+
+
+def test_a_drive_of_which_nothing_can_be_judged_is_an_error():
+    log = drive()
+    spun = replace(log, frame=log.frame.with_columns(pl.col("yaw_rate") * 57.3 + 20.0))
+    with pytest.raises(SignalError, match=r"none of 60 s can be judged: v_x times yaw_rate is .* units wrong"):
+        judged(spun)
+    fast = replace(log, frame=log.frame.with_columns(pl.col("v_x") * 3.6))
+    with pytest.raises(SignalError, match=r"v_x and the wheel speeds give a radius of 1\.1"):
+        judged(fast)
 
 
 def test_three_drives_on_other_roads_are_no_repetitions():
