@@ -85,9 +85,16 @@ def _job(
 
 
 def name_of(campaign: Campaign, logs: Sequence[Path]) -> str:
-    """Name of a drive as in the campaign file."""
+    """Name of a drive as in the campaign file. Bytes of a file name that are no UTF-8, which no table could hold, are
+    written out: `bad\\xff.parquet`."""
     base = campaign.path.parent
-    return "; ".join(str(p.relative_to(base)) if p.is_relative_to(base) else str(p) for p in logs)
+    told = "; ".join(str(p.relative_to(base)) if p.is_relative_to(base) else str(p) for p in logs)
+    return in_utf8(told)
+
+
+def in_utf8(text: str) -> str:
+    """Text with the bytes of file names that are no UTF-8 written out."""
+    return text.encode("utf-8", "surrogateescape").decode("utf-8", "backslashreplace")
 
 
 def result_key(

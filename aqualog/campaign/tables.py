@@ -11,7 +11,7 @@ import polars as pl
 
 from aqualog import __version__
 from aqualog.campaign.definition import Campaign
-from aqualog.campaign.jobs import code_stamp, name_of
+from aqualog.campaign.jobs import code_stamp, in_utf8, name_of
 from aqualog.campaign.results import CampaignData, RunInfo
 from aqualog.core.errors import ConfigError
 from aqualog.detect.registry import DETECTORS
@@ -75,7 +75,8 @@ def runs_table(infos: Sequence[RunInfo]) -> pl.DataFrame:
         "full_episodes": pl.Int64, **{f"events_{d}": pl.Int64 for d in DETECTORS}, "unavailable": pl.String,
         "truncated": pl.Boolean, **dict.fromkeys(_QUALITY, pl.Int64), "notes": pl.String,
     }  # fmt: skip
-    return pl.DataFrame([_run_row(i) for i in infos], schema=schema, strict=False)
+    rows = [{k: in_utf8(x) if isinstance(x, str) else x for k, x in _run_row(i).items()} for i in infos]
+    return pl.DataFrame(rows, schema=schema, strict=False)
 
 
 def events_table(infos: Sequence[RunInfo]) -> pl.DataFrame:

@@ -14,6 +14,7 @@ from aqualog.core.records import BoolArray, Event, FloatArray, Unavailable
 from aqualog.detect.episodes import Stretch, episodes_of
 from aqualog.detect.margin.watch import MARGIN
 from aqualog.detect.registry import all_of
+from aqualog.detect.spin import SPIN_DOWN
 
 __all__ = ["JOINT", "NEVER_TOGETHER", "UNFIT", "Unjudged", "judge"]
 
@@ -101,14 +102,16 @@ def judge(
         Wheels that no engine drives and whose brakes are known.
 
     A single detector does not decide: without a joint one the verdict is `cannot_be_judged`, whatever the others found.
-    But a free wheel that loses half of its speed needs no second sign.
+    But a free wheel that loses half of its speed needs no second sign. "None" needs front wheels that were watched:
+    without spin-downs a joint detector has no sign of a wheel that floats.
     """
     alone = rolling if not any(d in ran for d in JOINT) else ()
     found = episodes_of(events, way, warns=MARGIN.name in ran, rolling=alone)
     if not is_possible:
         return Judgement("cannot_be_judged", (UNFIT,), tuple(ran), found, judged_s)
     wet = any(e.kind == "aquaplaning" for e in found)
-    if wet or (any(d in ran for d in JOINT) and judged_s >= SHORTEST_S):
+    unwatched = [m for u in unavailable if u.detector == SPIN_DOWN.name for m in u.missing]
+    if wet or (any(d in ran for d in JOINT) and judged_s >= SHORTEST_S and not unwatched):
         return Judgement("aquaplaning" if wet else "none", (), tuple(ran), found, judged_s)
-    lacks = [m for u in unavailable if u.detector in JOINT for m in u.missing]
+    lacks = [m for u in unavailable if u.detector in JOINT for m in u.missing] or unwatched
     return Judgement("cannot_be_judged", tuple(dict.fromkeys(lacks or [NEVER_TOGETHER])), tuple(ran), found, judged_s)

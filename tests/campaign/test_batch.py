@@ -1,6 +1,8 @@
 """The batch: what is new and nothing else, bad logs told, kills survived, a store that opens by itself."""
 
 import json
+import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -25,6 +27,7 @@ from aqualog.guard.worker import Crashed
 from aqualog.model.programme import SEDAN
 from tests.campaign.made import make_campaign
 from tests.commands import run
+from tests.conftest import ROOT
 
 
 @pytest.fixture(scope="module")
@@ -227,6 +230,18 @@ def test_bad_logs_are_named_and_the_others_done(own):
     assert again.exit_code == 3
     document = json.loads(again.stdout)
     assert (document["made"], document["kept"], len(document["failed"])) == (0, 1, 2)
+
+
+def test_a_file_name_that_is_no_utf8_costs_no_other_log(tmp_path):
+    folder = Path(os.fsdecode(bytes(tmp_path) + b"/bad\xff"))
+    folder.mkdir()
+    for name in ("a.mf4", os.fsdecode(b"b\xfe.mf4"), os.fsdecode(b"c\xfe.parquet")):
+        shutil.copy(ROOT / "sample_logs" / f"lane_drive{Path(name).suffix}", folder / name)
+    result = run("batch", folder, "--vehicle", ROOT / "sample_logs" / "vehicle.toml", "-o", tmp_path / "s")
+    assert result.exit_code == 3  # the library for Parquet opens no such name
+    told = pl.read_parquet(tmp_path / "s" / "runs.parquet")
+    assert told.filter(pl.col("state") == "done").height == 2
+    assert all("\\xfe" in n for n in told["name"].to_list()[1:])
 
 
 def test_nothing_usable(own):

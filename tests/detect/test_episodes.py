@@ -191,6 +191,16 @@ def test_what_is_missing_is_that_of_the_joint_detectors():
     assert verdict((), lacks[:1]).missing == ()
 
 
+def test_none_needs_front_wheels_that_were_watched():
+    joint = ("resistance", "joint_criteria")
+    slow = Unavailable("spin_down", ("wheel speeds at a higher rate",))
+    assert verdict((), ran=joint).verdict == "none"  # spin-downs were not asked for
+    assert (verdict((), [slow], ran=joint).verdict, verdict((), [slow], ran=joint).missing) == (
+        "cannot_be_judged", ("wheel speeds at a higher rate",),
+    )  # fmt: skip
+    assert verdict(LANE, [slow], ran=joint).verdict == "aquaplaning"
+
+
 @pytest.mark.parametrize("cuts", [(), (1,), (7, 8, 500, 501, 777)])
 def test_way_is_the_same_for_any_cut_and_knows_its_gaps(cuts):
     v = 20.0 + np.sin(np.arange(1000) / 50.0)

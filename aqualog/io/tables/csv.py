@@ -476,6 +476,10 @@ class CsvReader(TableReader):
         if self._layout.unproven:
             what = f'whether "{self._layout.unproven}" is a fraction or thousands is not proven; taken as a fraction'
             self._note(f"{what} ({csv_hint('decimal')})")
+        for column in self._layout.columns:
+            if column.is_grouped:
+                what = f'column "{column.name}": "{column.style.thousands}" is between thousands'
+                self._note(f"{what}, since other columns have the other sign before fractions ({csv_hint('decimal')})")
         for name in self._layout.twice:
             self._note(f'several columns are called "{name}": "{name}", "{name}#2" and so on in a map')
         for column in self._layout.columns:

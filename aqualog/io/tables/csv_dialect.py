@@ -47,7 +47,8 @@ _GROUP = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)  # as good a fracti
 class Column:
     """One column by its header and its sampled cells; `texts` of `sampled` filled ones are no value.
 
-    `name` is unique in the file, `header` what stands above it.
+    `name` is unique in the file, `header` what stands above it. `is_grouped`: other columns show that its sign is one
+    between thousands.
     """
 
     index: int
@@ -59,6 +60,7 @@ class Column:
     example: str = ""
     header: str = ""
     sampled: int = 0
+    is_grouped: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -280,15 +282,22 @@ def _columns(
     cells = [_Cells(tuple(r[k] for r in body if k < len(r) and r[k])) for k in range(len(names))]
     order = _told_styles(cells, decimal) if decimal else _preferred(cells, separator)
     # an apostrophe stands before a name only to keep a spreadsheet from running it
+    proven = "" if decimal else _proven_sign(cells, order)
     split = [split_unit(n[1:] if n[:1] == "'" and n[1:2] in ("=", "+", "-", "@", "\t") else n) for n in names]
     paths = unique_names([name for name, _ in split])
     below = units + [""] * len(names)
     columns = []
     for k, column in enumerate(cells):
-        style = _style(column, order)
+        alone = _style(column, order)
+        style = _with_thousands(column, alone, proven)
         kind = _kind(column, style)
         header, unit = split[k]
-        columns.append(Column(k, paths[k], unit or below[k], style, *kind, header or paths[k], len(column.cells)))
+        columns.append(
+            Column(k, paths[k], unit or below[k], style, *kind, header or paths[k], len(column.cells), style != alone)
+        )
+    foreign = [c.cells[0] for c, own in zip(cells, columns, strict=True) if _is_foreign(c, own, proven)]
+    if foreign:
+        return tuple(columns), foreign[0]
     return tuple(columns), "" if decimal or order[0].thousands else _unproven_cell(cells, columns)
 
 
@@ -359,6 +368,32 @@ def _style(column: _Cells, order: Sequence[Style]) -> Style:
         return order[0]
     usable = [s for s in order if not (s.thousands and any(_has_leading_zero(c, s.thousands) for c in column.cells))]
     return max(usable, key=column.explained)
+
+
+def _proven_sign(columns: Sequence[_Cells], order: Sequence[Style]) -> str:
+    """The file's decimal sign where a column shows it by fractions that are no groups of three; else empty."""
+    plain = next(s for s in order if not s.thousands)
+    found = (x for c in columns if c.is_all(plain) for x in c.cells if plain.decimal in x)
+    return plain.decimal if any(not _GROUP.fullmatch(x) for x in found) else ""
+
+
+def _with_thousands(column: _Cells, style: Style, proven: str) -> Style:
+    """The style with thousands for a column of numbers in groups of three by the sign that is not the file's decimal
+    sign, such as `1.570` beside `790` where others have `0,5`."""
+    if not proven or style.thousands or style.decimal == proven:
+        return style
+    grouped = next(s for s in STYLES if s.decimal == proven and s.thousands == style.decimal)
+    signed = [c for c in column.cells if style.decimal in c]
+    if len(signed) == len(column.cells):  # all may be fractions
+        return style
+    fits = bool(signed) and column.is_all(grouped) and not any(_has_leading_zero(c, grouped.thousands) for c in signed)
+    return grouped if fits else style
+
+
+def _is_foreign(cells: _Cells, column: Column, proven: str) -> bool:
+    """Whether all cells of a column are groups of three by a sign that is not the file's decimal sign."""
+    is_other = bool(proven) and column.kind == "number" and column.style.decimal != proven
+    return is_other and all(_GROUP.fullmatch(c) for c in cells.cells)
 
 
 def _has_leading_zero(cell: str, thousands: str) -> bool:

@@ -156,6 +156,15 @@ LAYOUTS = {  # text, units, values, times [ns]
     "a column of points in a file of commas": (
         "t [s];v;n;p\n0,00;50,5;3;1.234\n0,01;51,5;4;5.678\n", {}, {"p": [1.234, 5.678], "n": [3, 4]},
     ),
+    "thousands in a file of commas": (
+        "t [s];v;p\n0,00;50,5;790\n0,01;51,5;1.570\n", {}, {"p": [790, 1570]},
+    ),
+    "thousands in a file of points": (
+        "t [s];v;p\n0.00;50.5;790\n0.01;51.5;1,570\n", {}, {"p": [790, 1570]},
+    ),
+    "fractions beside integers in a file of commas": (
+        "t [s];v;p\n0,00;50,5;1\n0,01;51,5;0.570\n", {}, {"p": [1, 0.57]},
+    ),
     "integers of a file of commas that turn into fractions": (
         "t [s];n;v\n" + "".join([*LONG[:700], "700,5;700,25;0,5\n", *LONG[701:]]), {},
         {"n": [*range(700), 700.25, *range(701, 5000)]},
@@ -205,9 +214,19 @@ def test_layouts(read, case):
     assert {name: log[name] for name in values} == values
     assert not times or log.t("v") == times[0]
     assert not times or log.channels["v"].absolute == (times[0][-1] > 10**18)
+
     assert log.faults.lost_samples == (case == "one damaged cell proves no thousands")
     assert not log.faults.truncated
     assert not log.noted("line") or log.faults.lost_samples
+
+
+def test_thousands_that_other_columns_show_are_noted(read):
+    log = read("t [s];v;p\n0,00;50,5;790\n0,01;51,5;1.570\n")
+    assert log.noted('column "p": "." is between thousands, since other columns')
+    assert read(LAYOUTS[FOREIGN][0]).noted('whether "1.234" is a fraction or thousands is not proven')
+
+
+FOREIGN = "a column of points in a file of commas"
 
 
 @pytest.mark.parametrize("encoding", ["cp1252", "mac_roman", "cp850", "utf-8-sig"])
