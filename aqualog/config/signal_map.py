@@ -166,11 +166,12 @@ def _entry(signals: Table, symbol: str) -> Entry | None:
 
 def map_text(
     signal_map: SignalMap, *, comments: Iterable[str] = (), remarks: Mapping[str, str] | None = None,
-    unmapped: Sequence[str] = (),
+    unmapped: Sequence[str] = (), waiting: Iterable[str] = (),
 ) -> str:  # fmt: skip
     """Return the TOML text of a signal map; reading it again gives the same map.
 
-    `comments` stand at its head, `remarks` behind the lines of their signals, `unmapped` channels at its end.
+    `comments` stand at its head, `remarks` behind the lines of their signals, `unmapped` channels at its end. `waiting`
+    are lines that wait for a value, as comments among the signals: what follows their closing brace stands above.
     """
     remarks = remarks or {}
     lines = [f"# {_one_line(c)}" for c in comments]
@@ -189,6 +190,9 @@ def map_text(
     for symbol, entry in signal_map.entries.items():
         remark = f"  # {_one_line(remarks[symbol])}" if symbol in remarks else ""
         lines.append(f"{entry_line(entry)}{remark}")
+    for line in waiting:
+        entry_text, _, why = line.partition("}: ")
+        lines += [f"# {_one_line(why)}", f"# {_one_line(entry_text)}}}"]
     for name, clock in signal_map.clocks.items():
         lines += ["", f"[sources.{quoted(name)}]", f"offset_s = {clock.offset_s!r}"]
         if clock.drift_ppm or clock.at_s:

@@ -141,7 +141,7 @@ def scope(
     in_sample: bool,
 ) -> tuple[str, ...]:  # fmt: skip
     """Notes on what the interval holds for, on which drives the model is worse, and whether there is no gain."""
-    own = "the gain is on the drives that the model was fitted to; it is no evidence for other drives"
+    own = "the gain is that on the drives to which the model was fitted; other drives may gain less"
     reach = "the interval of the log score holds for the drives named; they are too few for a wider statement"
     if math.isnan(won.low):
         reach = f"no interval: the log score has a single block of {BLOCK_S:g} s"
@@ -150,7 +150,7 @@ def scope(
     notes = [own, reach] if in_sample else [reach]
     worse = [n for n, x, y in zip(names, before, after, strict=True) if float((y - x).sum()) < 0.0]
     if worse and len(names) > 1:
-        notes.append(f"worse with the model: {', '.join(worse)}")
+        notes.append(f"the model predicts {', '.join(worse)} worse than before")
     if not won.low > 0.0:
         notes.append("no measurable gain")
     return tuple(notes)

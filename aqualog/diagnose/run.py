@@ -182,11 +182,18 @@ def _diagnosed(
             *seen.notes,
             *([strain] if strain and outcome.verdict != "no_effect" else ()),
             *((_SHARED,) if any(c.drives for c in outcome.causes) else ()),
+            *((_NOT_HELD_OUT,) if holdout and (gained is None or gained.in_sample) else ()),
         ),
         views=_views(ready, before, after, {n for c in outcome.causes for n in c.drives}) if options.views else (),
         agreement=tuple(a for a in agreed if a.key in named),
         caution=not_calibrated(vehicle, ready[0].channels),
     )
+
+
+_NOT_HELD_OUT = (
+    "The held-out drives are not used: they show no road of another drive, no gain without a cause, and none without "
+    "the channels of the diagnosed drives."
+)
 
 
 def _strained(found: Found, evidence: Evidence, extended: Model, settled: Model, vehicle: Vehicle) -> str:

@@ -181,11 +181,11 @@ class Start(Result):
         from aqualog.config.signal_map import map_text
 
         drive = self.contents.drive
-        comments = [f"proposed for {', '.join(p.name for p in drive.paths)}: check every line", *self.marks]
+        comments = [f"proposed for {', '.join(p.name for p in drive.paths)}: check every line"]
         entries = {s: p.entry for s, p in self.proposals.items()}
         return map_text(
             replace(drive.signal_map, entries=entries), comments=comments,
-            remarks={s: p.remark for s, p in self.proposals.items()}, unmapped=self.unmapped,
+            remarks={s: p.remark for s, p in self.proposals.items()}, unmapped=self.unmapped, waiting=self.marks,
         )  # fmt: skip
 
     def write_files(self, *, force: bool = False) -> tuple[Path, ...]:

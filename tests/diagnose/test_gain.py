@@ -114,14 +114,14 @@ def test_few_drives_speak_for_themselves():
 
 
 def test_notes_tell_what_is_worse():
-    assert "worse with the model: 0" in notes(2.5)[1]
+    assert "the model predicts 0 worse than before" in notes(2.5)[1]
     won, said = notes(2.0, drives=1)
     assert won.value == 0.0
     assert "no measurable gain" in said
 
 
 def test_in_sample_is_told():
-    assert "fitted to" in notes(drives=1, in_sample=True)[1][0]
+    assert "to which the model was fitted" in notes(drives=1, in_sample=True)[1][0]
 
 
 def test_many_drives_are_units():

@@ -123,7 +123,12 @@ def test_without_an_answer_the_place_is_marked(tmp_path):
     assert [c.split()[1] for c in start.next_commands] == ["doctor", "convert"]
     start.write_files()
     assert "(a driveline torque with its scale: Motor Torque [Nm])" in start.text()
-    assert '# SET torque_r = { channel = "Motor Torque", scale = ... }' in (tmp_path / "work" / "map.toml").read_text()
+    text = (tmp_path / "work" / "map.toml").read_text()
+    line = '# SET torque_r = { channel = "Motor Torque", scale = ... }\n'
+    assert line in text
+    filled = tmp_path / "filled.toml"
+    filled.write_text(text.replace(line, line.removeprefix("# SET ").replace("...", "9.7")))
+    assert load_signal_map(filled).entries["torque_r"].scale == 9.7
 
 
 def test_a_unit_in_doubt_comes_before_the_ratio_and_two_questions_are_the_most(tmp_path):

@@ -76,12 +76,20 @@ def _crossed(curve: Curve, level: float, *, rising: bool) -> Number:
     found = crossing(curve, level, rising=rising)
     if found is None:
         return Number(math.nan, math.nan, math.nan, curve.place, "fewer than two bins with an interval")
+    slowest = next(p.v_kmh for p in curve.points if p.reliable)
+    if found.v_kmh == slowest:  # a bound, and no speed
+        return Number(
+            math.nan, -math.inf, slowest, curve.place, f"already reached in the slowest bin, {slowest:.0f} km/h"
+        )
     why = "" if math.isfinite(found.v_kmh) else f"not reached up to {found.to_kmh:.0f} km/h"
     return Number(found.v_kmh, *found.ci, curve.place, why)
 
 
 def _lowest(found: Sequence[Number]) -> Number:
     told = [n for n in found if math.isfinite(n.v)]
+    below = [n for n in found if math.isnan(n.v) and math.isfinite(n.high)]
+    if below:
+        return min(below, key=lambda n: n.high)
     if told:
         return min(told, key=lambda n: n.v)
     # of speeds that are only bounded below, the lowest bound holds for the car

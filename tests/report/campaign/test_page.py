@@ -444,6 +444,16 @@ def test_crossing_that_is_not_reached_is_open():
     assert crossing(Curve((), "", few), 0.2, rising=True) is None
 
 
+def test_a_level_that_the_slowest_bin_has_is_a_bound():
+    from aqualog.report.campaign.answers import _crossed, _lowest
+
+    bound = _crossed(curve((0.3, 0.4, 0.5, 0.6)), 0.2, rising=True)
+    assert (math.isnan(bound.v), bound.low, bound.high) == (True, -math.inf, 70.0)
+    other = _crossed(curve((0.0, 0.1, 0.3, 0.5)), 0.2, rising=True)
+    assert other.v == pytest.approx(85.0)
+    assert _lowest([other, bound]) == bound
+
+
 def test_answers_take_the_wheel_with_the_lowest_speed(findings):
     for a in answers_of(findings):
         told = [3.6 * f.v for f in findings.full if f.group == a.group and f.way == "spin_down" and f.v == f.v]
