@@ -27,6 +27,8 @@ MOVING = 5.0  # [m/s]
 BRAKED = 3e5  # [Pa] from which the detectors take a wheel for braked
 ROLLING = -0.3  # [m/s^2] a car that slows down less is not braked
 PUSHED = 0.2  # [m/s^2] by the torque: driving, and surely no braking that the torque does not hold
+HARD, LEAST_HARD = -2.5, 4  # [m/s²] more than motors that brake do on most cars (K); windows of half a second
+TINY = 1000.0  # [Pa] brakes have a hundred times that before they slow a car
 BLOCK = 20  # windows, 10 s: grade and wind last as long
 LEAST_BLOCKS = 10
 PASSENGER = 2500.0  # [kg] of a car whose tyres have at most `HIGHEST` (K)
@@ -57,6 +59,12 @@ def _brakes(windows: Windows) -> Iterator[Doubt]:
         return
     with np.errstate(invalid="ignore"):
         is_rolling = (windows.speed > MOVING) & (np.gradient(windows.speed, windows.step_s) > ROLLING)
+        hard = np.gradient(windows.speed, windows.step_s) < HARD
+        highest = float(np.nanmax(windows["brake_pressure"][hard], initial=-np.inf))
+    if hard.sum() >= LEAST_HARD and 0.0 < highest < TINY:
+        what = f"brake_pressure is {highest:.3g} Pa at most while the car slows down by {-HARD:g} m/s² and more"
+        yield Doubt("scale", ("brake_pressure",), what, "is it in bar? In Pa, brakes have 1e6 and more", value=highest)
+        return
     pressure = windows["brake_pressure"][is_rolling]
     pressure = pressure[np.isfinite(pressure)]
     if pressure.size < BLOCK or (middle := float(np.median(pressure))) <= BRAKED:

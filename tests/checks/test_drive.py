@@ -166,3 +166,13 @@ def test_a_brake_that_acts_on_a_car_that_does_not_slow_down(offset, is_named):
     braking = np.gradient(columns["v_x"], 0.05) < -0.5
     remarks = look(signals({**columns, "brake_pressure": offset + 30e5 * braking}), CAR)
     assert [r.signals for r in remarks if "bar" in r.what] == [("brake_pressure",)] * is_named
+
+
+@pytest.mark.parametrize(("scale", "decel", "is_named"), [(1.0, 4.0, False), (1e-5, 4.0, True), (1e-5, 1.5, False)])
+def test_a_brake_pressure_in_bar(scale, decel, is_named):
+    columns = made(seconds=30.0)
+    t = 0.05 * np.arange(columns["v_x"].size)
+    v = np.where(t < 20.0, 30.0, np.maximum(30.0 - decel * (t - 20.0), 8.0))
+    columns = {**columns, "v_x": v, **{f"omega_{w}": v / CAR.r_e(w) for w in ("fl", "fr", "rl", "rr")}}
+    remarks = look(signals({**columns, "brake_pressure": scale * 30e5 * ((t > 20.0) & (v > 8.0))}), CAR)
+    assert any("is it in bar?" in r.advice for r in remarks) == is_named

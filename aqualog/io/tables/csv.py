@@ -12,6 +12,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from aqualog.core.errors import LogError
+from aqualog.core.notation import SYMBOLS
 from aqualog.core.records import BoolArray, Channel, ChannelInfo, FloatArray
 from aqualog.io.reader import Part, ReadOptions, csv_hint, format_of, one_piece, part_of
 from aqualog.io.tables.columns import (
@@ -36,8 +37,7 @@ _HABIT = 0.1
 _TAIL = 1 << 16  # [bytes]
 Text = bytes | TextFile
 
-PIECE = 1 << 24  # [bytes]
-_ABOVE = 20  # lines
+PIECE, _ABOVE = 1 << 24, 20  # [bytes]; lines
 _JOIN = "\x1f"  # unit separator: in no cell
 
 
@@ -478,12 +478,13 @@ class CsvReader(TableReader):
             self._note(f"{what} ({csv_hint('decimal')})")
         for column in self._layout.columns:
             if column.is_grouped:
-                what = f'column "{column.name}": "{column.style.thousands}" is between thousands'
-                self._note(f"{what}, since other columns have the other sign before fractions ({csv_hint('decimal')})")
+                what = f'column "{column.name}": "{column.style.thousands}" is between thousands, since other columns'
+                self._note(f"{what} have the other sign before fractions ({csv_hint('decimal')})")
         for name in self._layout.twice:
             self._note(f'several columns are called "{name}": "{name}", "{name}#2" and so on in a map')
         for column in self._layout.columns:
-            if column.kind == "text" and column.texts < column.sampled:
+            is_signal = column.unit or column.name in SYMBOLS or column.texts < column.sampled  # else a comment
+            if column.kind == "text" and is_signal:
                 share = f'{column.texts} of {column.sampled} cells looked at are text such as "{column.example[:40]}"'
                 self._note(f'column "{column.name}" is left out: {share}')
 

@@ -226,6 +226,15 @@ def test_thousands_that_other_columns_show_are_noted(read):
     assert read(LAYOUTS[FOREIGN][0]).noted('whether "1.234" is a fraction or thousands is not proven')
 
 
+@pytest.mark.parametrize("head", ["omega_fl", "speed [rad/s]"])
+def test_a_signal_whose_cells_are_all_text_is_noted(read, head):
+    name = head.partition(" [")[0]
+    assert read(f"t [s];v;{head};note\n0;1;0x55;a\n1;2;0x56;b\n").noted(
+        f'column "{name}" is left out: 2 of 2 cells', "0x55"
+    )
+    assert not read(f"t [s];v;{head};note\n0;1;0x55;a\n1;2;0x56;b\n").noted('"note" is left out')
+
+
 FOREIGN = "a column of points in a file of commas"
 
 
