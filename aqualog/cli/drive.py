@@ -55,8 +55,9 @@ def detect(
         written = [write, *(layout_texts(write, ()) if layouts else ())]
     elif layouts:
         raise ConfigError("--layouts without --write", expected="--write FILE.mcap, the log that they show")
-    if out is not None and history is not None and out.absolute() == history.absolute():
-        raise ConfigError("is the folder of the results", where=str(history), expected="a file of its own")
+    for file in (write, history):
+        if out is not None and file is not None and out.absolute() == file.absolute():
+            raise ConfigError("is the folder of the results", where=str(file), expected="a file of its own")
     given = [p for p in (run.thresholds, run.model) if p is not None]
     targets += written
     drive = run.drive(targets, others=given)
@@ -69,10 +70,10 @@ def detect(
             samples=out is not None or write is not None, progress=hear,
         )  # fmt: skip
         hear("writing")
+        if write is not None:  # before the folder: where it cannot be written, nothing is
+            result.write(write, layouts=layouts, force=True)
         if out is not None:
             result.save(out, force=True)
-        if write is not None:
-            result.write(write, layouts=layouts, force=True)
         if history is not None:
             result.remember(history)
     notes = (

@@ -40,6 +40,14 @@ def test_json_of_the_contract():
     assert set(document["quality"]) >= {"dropped_samples", "time_jumps", "truncated"}
 
 
+@pytest.mark.parametrize("write", ["out.parquet", "no/such/folder/x.parquet"])
+def test_a_second_result_that_cannot_be_written_leaves_no_first(tmp_path, write):
+    (tmp_path / "no").write_text("a file")
+    result = run("detect", MF4, "--vehicle", CAR, "-o", tmp_path / "out.parquet", "--write", tmp_path / write)
+    assert result.exit_code in (1, 2)
+    assert not (tmp_path / "out.parquet").exists()
+
+
 def test_results_folder_and_refusal_to_overwrite(tmp_path):
     out = tmp_path / "out"
     assert run("detect", MF4, "--vehicle", CAR, "-o", out).exit_code == 0
