@@ -365,4 +365,4 @@ def test_a_control_that_nobody_drove():
 
 def test_headline_without_a_run_of_this_kind():
     test = straight(("A", [StraightRun(reasons=("no watered lane in the log",))]))
-    assert headline(test) == "straight aquaplaning: 0 of 1 run valid: there is no run of this kind"
+    assert headline(test) == "straight aquaplaning: 0 of 1 run valid; the list below says why"

@@ -51,7 +51,7 @@ def headline(test: TradeTest) -> str:
     if not test.entries:
         return f"{what}: no log could be read"
     if not test.valid:
-        return f"{what}: {runs}: there is no {noun} of this kind"
+        return f"{what}: {runs}; the list below says why"
     sets = [s for s in test.sets if _valid(s)]
     return f"{what}: {runs}, {counted(len(sets), 'set')}"
 
