@@ -54,6 +54,7 @@ def diagnosis_report(
     most = [name for name, _ in by_change(d)]
     explained = {x for c in d["causes"] for x in c["explains"]}
     explained = explained or {r["channel"] for r in d["unexplained"]}
+    is_road = bool(d["causes"]) and "grade_rms" in (d["causes"][0]["parameters"] or {})
     causes = sorted(explained, key=lambda x: (most.index(x) if x in most else len(most), x))
     answers = [
         ("Test", said["test"]),
@@ -94,7 +95,7 @@ def diagnosis_report(
     footer = " ".join([*said["test"][1:], f"Intervals {level}."])
     return Report(
         "diagnosis", "what the simulation gets wrong", sections, _facts(d), figures, footer,
-        {"view-data": view_data(views, causes)}, ("diagnosis.js", "figures.js"),
+        {"view-data": view_data(views, causes, "position" if is_road else "")}, ("diagnosis.js", "figures.js"),
     )  # fmt: skip
 
 

@@ -36,7 +36,7 @@ def coordinate_axis(name: str) -> tuple[str, float, float]:
     return f"{c.title} [{c.page_unit}]", c.factor, c.offset
 
 
-def view_data(views: Sequence[ResidualView], explained: Sequence[str] = ()) -> dict[str, Any]:
+def view_data(views: Sequence[ResidualView], explained: Sequence[str] = (), over: str = "") -> dict[str, Any]:
     """Data that the page's script draws.
 
     Parameters
@@ -45,6 +45,8 @@ def view_data(views: Sequence[ResidualView], explained: Sequence[str] = ()) -> d
     explained : sequence of str
         Channels whose error the causes reduce, the most reduced first. The page opens with that panel, over the
         coordinate that matters most to all of them.
+    over : str
+        Coordinate with which it opens, if the drives have it: that of the cause, as the place of a road.
 
     Returns
     -------
@@ -71,7 +73,7 @@ def view_data(views: Sequence[ResidualView], explained: Sequence[str] = ()) -> d
     return {
         "drives": [plot_text(d) for d in drives],
         "coordinates": [[c, coordinate_axis(c)[0], c in _ALONG] for c in names],
-        "start": _start(views, explained),
+        "start": over if over in names else _start(views, explained),
         "tables": tables,
         "views": shown,
     }

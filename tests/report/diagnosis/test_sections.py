@@ -112,6 +112,11 @@ def test_the_page_opens_over_what_explains_most_of_all_channels():
     assert view_data([force, slip, rod], ["slip_rl", "force_balance", "slip_rr"])["start"] in ("torque", "a_x")
 
 
+def test_the_page_opens_over_the_place_of_a_road():
+    assert view_data(views_of("named"), ["force_balance"], "position")["start"] == "position"
+    assert view_data(views_of("named"), ["force_balance"], "altitude")["start"] == "torque"
+
+
 def test_speed_is_in_kmh_and_a_coordinate_without_change_has_no_bins():
     v = view("a", "kinematic")
     v.coordinates["v_x"][:] = 20.0
