@@ -294,11 +294,13 @@ def _indexed(test: TradeTest, rows: Sequence[SetRow], made: _Made) -> TradeTest:
     of_control = [e.tyre == options.control for e in entries]
     orders = [e.order for e in entries]
     found: dict[Group, ControlRow | None] = {}
+    driven = {_rest(e.group) for e, own in zip(entries, of_control, strict=True) if own}
+    every = driven.pop() if len(driven) == 1 else ()
     indexed = []
     for row in rows:
         rest = _rest(row.group)
         same = [own and _rest(e.group) == rest for own, e in zip(of_control, entries, strict=True)]
-        own, key = (same, rest) if any(same) else (of_control, ())
+        own, key = (same, rest) if any(same) else (of_control, every)
         if key not in found:
             found[key] = _control_row(key, made(blocks_of(orders, own)), options)
         indexed.append(row if row.is_control else _with_index(row, found[key], entries, options, is_same=any(same)))

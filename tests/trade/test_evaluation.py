@@ -227,6 +227,12 @@ def test_control_of_the_same_configuration_if_it_has_one():
     own, strange = (s for s in test.sets if s.index is not None)
     assert own.index.control == pytest.approx(70.1)
     assert "another configuration" in strange.index_note
+    assert len(test.controls) == 3  # those of 2.0 and 2.5 bar, and both for 3.0 bar
+    test = evaluated(
+        [entry(*g, i) for i, g in enumerate((*given[:2], *given[4:]))],
+        Options("straight", defaults(), ("tyre", "pressure_rear_bar"), "C"),
+    )
+    assert len(test.controls) == 1  # one configuration stands once
 
 
 def test_document_of_the_contract():

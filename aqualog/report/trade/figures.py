@@ -137,7 +137,10 @@ def _slip(test: TradeTest) -> dict[str, Any] | None:
             left -= 1
             v, slip = f.curve
             name = group_text(s.group)
-            keep = np.flatnonzero(slip[: int(np.nanargmax(v)) + 1] < 1.0)  # not the way back, with the throttle let go
+            # not the way back, where the throttle is let go or the lane ends
+            most = np.nan_to_num(v, nan=-1.0) if test.entries[i].is_censored else np.where(slip < 1.0, slip, -1.0)
+            last = int(np.argmax(most))
+            keep = np.flatnonzero(slip[: last + 1] < 1.0)
             end = int(keep[-1]) + 1 if keep.size else 0
             dash = "solid" if test.entries[i].valid else "dot"
             data.append(line(
