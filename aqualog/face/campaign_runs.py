@@ -254,8 +254,10 @@ class CampaignRuns(Result):
         return "\n".join([f"{self.data.name}: {self._head()}", *failed])
 
     def _head(self) -> str:
+        from aqualog.report.values import counted
+
         o = self.outcome
-        return f"{o.done} logs done ({o.made} now, {o.kept} before), {len(o.failed)} failed"
+        return f"{counted(o.done, 'log')} done ({o.made} now, {o.kept} before), {len(o.failed)} failed"
 
     def _verdicts(self) -> dict[str, int]:
         """Runs with results, by verdict."""

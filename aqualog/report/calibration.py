@@ -18,7 +18,7 @@ from aqualog.report.figures import axis, dots, figure
 from aqualog.report.inputs import input_sections
 from aqualog.report.sections import Figures, Lines, Para, Report, Section, Table
 from aqualog.report.theme import MUTED, wheel_colour
-from aqualog.report.values import KMH, fields_of, plain, pretty_unit
+from aqualog.report.values import KMH, counted, fields_of, plain, pretty_unit
 
 __all__ = ["balance_residuals", "calibration_document", "calibration_report", "estimated", "parameter_cells"]
 
@@ -118,8 +118,9 @@ def calibration_report(c: Calibration, notes: Sequence[str] = (), checks: Sequen
 def estimated(c: Calibration) -> str:
     """`9 of 12 parameters estimated from 4 drives`, and how many of these the vehicle file contradicts."""
     known, kept = ([p for p in c.parameters if p.identified], [p for p in c.parameters if p.kept])
-    used = f"{sum(not p.why for p in c.passes)} passes over water" if c.passes else f"{len(c.drives)} drives"
-    own = f"; {len(kept)} of them contradict the vehicle file, which keeps its own" if kept else ""
+    used = f"{sum(not p.why for p in c.passes)} passes over water" if c.passes else counted(len(c.drives), "drive")
+    verb = "contradicts" if len(kept) == 1 else "contradict"
+    own = f"; {len(kept)} of them {verb} the vehicle file, which keeps its own" if kept else ""
     return f"{len(known)} of {len(c.parameters)} parameters estimated from {used}{own}"
 
 

@@ -434,7 +434,7 @@ def test_what_is_kept_keeps_its_provenance_and_a_ratio_of_radii_knows_no_size(se
     light = replace(believed(true), given=frozenset({"mass"}), provenance={"mass": Provenance("measured")})
     kept = [replace(p, kept=True) if p.name == "mass" else p for p in result.parameters]
     assert calibrated(light, kept).provenance["mass"] == Provenance("measured")
-    assert "; 1 of them contradict the vehicle file" in estimated(replace(result, parameters=tuple(kept)))
+    assert "; 1 of them contradicts the vehicle file" in estimated(replace(result, parameters=tuple(kept)))
     assert "contradict" not in estimated(result)
     ratio = [p for p in result.parameters if p.name == "r_e_ratio"]
     for given, share in ((frozenset(), 0.015), (frozenset({"wheels.r_e_f", "wheels.r_e_r"}), 0.01)):

@@ -187,7 +187,7 @@ def test_lane_times_that_the_log_contradicts(own):
     assert "v100_0.parquet: the campaign has dry road from 1.20 to 3.20 s, the log has water from 1.20 to 3." in said
     assert "Try: the lane times of this log, or none: then its on_water counts" in said
     assert "note: lane times beside the on_water of 1 of 3 runs, which count: logs/v090_0.parquet: the campaign" in said
-    assert "1 logs done (1 now, 0 before), 2 failed" in done.stdout
+    assert "1 log done (1 now, 0 before), 2 failed" in done.stdout
     data = load_results(configure(own), Store(own.with_suffix(".store")))
     (short,) = data.done
     s = data.samples(short)
@@ -220,7 +220,7 @@ def test_bad_logs_are_named_and_the_others_done(own):
     (folder / "logs" / "v090_0.parquet").unlink()
     result = run("batch", own, "-o", folder / "s")
     assert result.exit_code == 3
-    assert "1 logs done" in result.stdout
+    assert "1 log done" in result.stdout
     assert "v080_0.parquet: is empty" in result.stderr
     assert "v090_0.parquet" in result.stderr
     assert "no such file" in result.stderr

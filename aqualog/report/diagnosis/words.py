@@ -259,7 +259,7 @@ def _score(g: Mapping[str, Any] | None) -> list[str]:
         return [f"{where} the log score changes by {short(score)} {unit}{interval}: no measurable gain."]
     change = "rises" if score >= 0.0 else "falls"
     promised = (
-        f"; right causes of these sizes gain {short(p)} on average" if (p := g["promised_log_score_gain"]) else ""
+        f"; {short(p)} are expected of right causes of these sizes" if (p := g["promised_log_score_gain"]) else ""
     )
     return [f"{where} the log score {change} by {short(abs(score))} {unit}{interval}{promised}."]
 
