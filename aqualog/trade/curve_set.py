@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aqualog.core.intervals import NOWHERE, Interval, widened
 from aqualog.core.records import FloatArray
 from aqualog.trade.concave import area_under, concave_fit, falls_to
-from aqualog.trade.control import Estimate
+from aqualog.trade.control import Estimate, satterthwaite
 from aqualog.trade.curve import KMH, CurvePass
 from aqualog.trade.limits import CurveLimits
 
@@ -126,7 +126,8 @@ def curve_set(
     pass takes the deviations of the others.
 
     Passes of one log have its water and its sensor in common. Where two logs and more have several passes, whole logs
-    are drawn, each with its deviations in all steps; the degrees of freedom are the logs less one.
+    are drawn, each with its deviations in all steps; degrees of freedom are those of the sum of the scatter between
+    logs and within them [satterthwaite1946].
     """
     names = logs or [str(k) for k in range(len(passes))]
     good = _steps([p for p in passes if p.valid], limits, [n for n, p in zip(names, passes, strict=True) if p.valid])
@@ -138,7 +139,7 @@ def curve_set(
     own = _read(v, *curves, good.means(good.dry), limits, result, between)
     draws = _draws(good, v, limits, result, between)
     spread = draws.std(axis=0, ddof=1) if draws.size else np.full(4, np.nan)
-    dof = float(good.drives - 1 if good.is_clustered else good.v.size - v.size)
+    dof = _freedom(good, v.size)
 
     def interval(k: int) -> Interval:
         seen = draws[np.isfinite(draws[:, k]), k] if draws.size else draws
@@ -154,6 +155,20 @@ def curve_set(
             *_sensor_notes([p for p in passes if p.valid]),
         ),
     )  # fmt: skip
+
+
+def _freedom(good: _Steps, steps: int) -> float:
+    """Degrees of freedom of the mean: between logs there are the logs less one, within them what is left."""
+    free = float(good.v.size - steps)
+    if not good.is_clustered:
+        return free
+    away = good.mean - good.means(good.mean)[np.searchsorted(np.unique(good.step), good.step)]
+    own = [away[good.log == k] for k in range(good.drives)]
+    within = max(free - (good.drives - 1.0), 1.0)
+    inner = sum(float(((x - x.mean()) ** 2).sum()) for x in own) / within
+    outer = sum(x.size * float(x.mean()) ** 2 for x in own) / (good.drives - 1.0)
+    each = max(outer - inner, 0.0) / (good.v.size / good.drives)  # variance of a log
+    return satterthwaite([each / good.drives, inner / good.v.size], [good.drives - 1.0, within])
 
 
 def _steps(passes: Sequence[CurvePass], limits: CurveLimits, logs: Sequence[str] = ()) -> _Steps:

@@ -152,7 +152,8 @@ def copies_in(campaign: Campaign) -> dict[int, int]:
     for index, run in enumerate(campaign.runs):
         with suppress(OSError):
             by_size.setdefault((run.lane, *(p.stat().st_size for p in run.logs)), []).append(index)
-    contents, found = Contents(), dict[int, int]()
+    contents = Contents()
+    found: dict[int, int] = {}
     for alike in (runs for runs in by_size.values() if len(runs) > 1):
         first: dict[tuple[str, ...], int] = {}
         for index in alike:

@@ -9,7 +9,7 @@ from aqualog.core.records import BoolArray, Signals
 
 __all__ = ["wrong_curve", "wrong_speed"]
 
-RADII = (0.2, 0.5)  # [m] effective, of tyres of cars and vans (K)
+RADII = (0.2, 0.6)  # [m] effective, from small cars to lorries (K)
 _OMEGA_LEAST, _V_LEAST = 1.0, 3.0  # [rad/s], [m/s] below, a wheel or the car may stand
 _CURVE_SHARE = 0.3  # of the lateral acceleration: body roll and side slip change it by less (K)
 _YAW_LEAST = 0.02  # [rad/s] less may be an offset
