@@ -58,6 +58,10 @@ ODD = {
     "no dry road": (changed(on_water=(T < 6.0).astype(float)), "of dry road before the trough"),
     "all NaN": (changed(a_y=np.full(T.size, np.nan)), "a_y is not in the log"),
     "km/h": (changed(omega_fl=drive()["v_x"] / 1.1, omega_rr=drive()["v_x"] / 1.1), "a radius of 1.10 m"),
+    "turned yaw rate": (
+        changed(yaw_rate=-drive()["a_y"] / drive()["v_x"]),
+        "v_x times yaw_rate is -4.94 m/s², a_y 4.94",
+    ),
     "deg/s": (changed(yaw_rate=drive()["a_y"] / drive()["v_x"] * 57.3), "v_x times yaw_rate is 282.96 m/s², a_y 4.94"),
 }
 
@@ -197,6 +201,7 @@ def test_an_offset_of_a_y_and_what_its_delay_does_are_remarked(sign):
     columns = drive(sign=sign)
     columns["yaw_rate"] = sign * (80 * KMH / 100.0 - 0.1 / (80 * KMH)) * np.ones(T.size)
     (p,) = curve_passes(signals(columns), radius=100.0)
+    assert p.valid, p.reasons
     assert p.off == pytest.approx(0.1)
     late = {**columns, "a_y": np.concatenate([np.full(3, columns["a_y"][0]), columns["a_y"][:-3]])}
     (q,) = curve_passes(signals(late), radius=100.0)
