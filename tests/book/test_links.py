@@ -1,4 +1,4 @@
-"""No link of the documents leads nowhere, no picture is missing, and the site builds strictly and works offline."""
+"""Links of the documents lead somewhere, pictures are there, rows stand in tables; the site builds strictly, works offline."""
 
 import re
 import unicodedata
@@ -45,6 +45,12 @@ def test_links_and_pictures_lead_somewhere(path):
         ):
             dead.append(target)
     assert dead == []
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda p: str(p.relative_to(ROOT)))
+def test_every_row_stands_in_a_table(path):
+    blocks = re.findall(r"(?:^\|.*\n?)+", path.read_text(encoding="utf-8"), re.M)
+    assert [b[:60] for b in blocks if not re.match(r".*\n\|[-:| ]+\n", b)] == []
 
 
 def test_every_picture_is_shown():
