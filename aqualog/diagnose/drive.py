@@ -41,6 +41,7 @@ SETTLES_S = 2.0  # [s] after a gear shift, until the body no longer pitches (K)
 SHIFTS_MOST = 0.3  # [-] of the drive: beyond, the torque is noisy
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
 BRAKES, LONG_AGO_S = -0.8, 60.0  # [m/s^2], [s] braking, and when it has been long ago
+BRAKED, BRAKED_ALL = 0.03, 0.4  # [m/s^2] of all wheels that are not driven, and of a car with none, when brakes are on (K)
 WHILE_S = -15.0  # [s] in place of it while braking: far enough to act as it does after it, or not at all
 ROLLS_OUT = 0.15  # [m/s^2] a slope of 1.5 %, so that a road does not count as a brake
 # slip of a wheel beyond its grip: a wet tyre's force has its largest value at 0.08 to 0.2 (D: 3 mu / C), and driving
@@ -180,7 +181,7 @@ def prepare(signals: Signals, vehicle: Vehicle, name: str, *, judges_afloat: boo
     settling = block_means(shows_road.astype(np.float64), dt) > 0.0
     return Drive(
         name, dt, vehicle, course, speed, filled, channels, mask, mask & settling,
-        _coordinates(filled, course, speed, v, dt), present, not torqued, n * dt,
+        _coordinates(filled, course, speed, v, dt, _braked(filled, torque, vehicle)), present, not torqued, n * dt,
         (*notes, *_judged_on_water(mask, course, dt)),
     )  # fmt: skip
 
@@ -330,10 +331,26 @@ def _widened(bad: BoolArray, by: float, dt: float) -> BoolArray:
     return np.convolve(bad.astype(np.float64), np.ones(2 * k + 1), "same") > 0.5
 
 
+def _braked(columns: Mapping[str, FloatArray], torque: FloatArray, vehicle: Vehicle) -> BoolArray | None:
+    """Where the brakes are on (n,), by their pressure or by the torque of wheels: of those that nothing else slows, or
+    of all beyond what an engine slows; None where the log has neither."""
+    if "brake_pressure" in columns:
+        return np.asarray(columns["brake_pressure"] > inputs.BRAKE_PRESSURE)
+    if not all(f"torque_{w}" in columns for w in WHEELS):
+        return None
+    rolling = [i for i, w in enumerate(WHEELS) if w not in vehicle.driven]
+    pull = torque[rolling or slice(None)].sum(axis=0)
+    released, least = (float(np.median(pull)), BRAKED) if rolling else (0.0, BRAKED_ALL)
+    on = pull < released - least * vehicle.mass * vehicle.arm("fl")
+    return np.asarray(on) if on.any() else None
+
+
 def _coordinates(
-    columns: Mapping[str, FloatArray], course: Course, speed: FloatArray, v: FloatArray, dt: float
-) -> dict[str, FloatArray]:
-    """Coordinates without the noise of the channels: a function of a noisy one would correlate with its noise."""
+    columns: Mapping[str, FloatArray], course: Course, speed: FloatArray, v: FloatArray, dt: float,
+    braked: BoolArray | None,
+) -> dict[str, FloatArray]:  # fmt: skip
+    """Coordinates without the noise of the channels: a function of a noisy one would correlate with its noise.
+    `braked` (n,): where the brakes are on, if known."""
     out = {
         "t": course.t,
         "v_x": speed,
@@ -347,7 +364,7 @@ def _coordinates(
     if "yaw_rate" in columns:
         turning = inputs.smooth(columns["yaw_rate"], dt, inputs.SPEED_S)
         out |= {"a_y": speed * turning, "yaw_rate": turning}
-    slowing = out["a_x"] < BRAKES
+    slowing = out["a_x"] < BRAKES if braked is None else braked
     if slowing.any():
         last = np.maximum.accumulate(np.where(slowing, course.t, course.t[0] - LONG_AGO_S))
         # what lingers may act while braking, too, or begin with a jump where the brakes are let off

@@ -46,8 +46,12 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
         chosen, noises = best.option.refit, [w.noise for w in found.posterior.weighings]
         if chosen is None:
             return ()
+        doubts = [
+            f"{found.outshone[c.name]} explains the log better than {name_of(c.effect, c.where)}."
+            for c in best.large if c.name in found.outshone
+        ]  # fmt: skip
         # a member that is too small to be worth naming is not named: its sign says nothing against the others
-        return repeats(chosen, found.arena, noises, {(c.key, "".join(c.drives)) for c in best.large})
+        return *doubts, *repeats(chosen, found.arena, noises, {(c.key, "".join(c.drives)) for c in best.large})
 
     def causes_of(o: Option) -> Causes | None:
         if o.refit is not None:

@@ -5,8 +5,8 @@ gives their evidence anew."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import count
 
@@ -35,7 +35,7 @@ from aqualog.diagnose.isolate import compatible, imitations
 from aqualog.diagnose.records import Remainder, Significance
 from aqualog.diagnose.refit import KNOWN, Metric, Refit, metric, refit, secants, silent
 from aqualog.diagnose.threads import beside
-from aqualog.diagnose.unexplained import unknown_forms
+from aqualog.diagnose.unexplained import outshone, unknown_forms
 from aqualog.diagnose.words import listed, name_of
 from aqualog.model.term import Model
 
@@ -73,7 +73,8 @@ class Option:
 class Found:
     """Inner products (K + 1, K + 1), `plain` and in `gram` with tolerances, and `calibration` describe what the log can
     distinguish. With unknown `forms`, `arena` and `posterior` are those of all that competes and there are no
-    `options`. Else they are those of known effects, and `options` the sets with what they gain."""
+    `options`. Else they are those of known effects, and `options` the sets with what they gain; `outshone`: effects that a form makes unlikely, by name, with the
+    form."""
 
     significance: Significance
     plain: FloatArray
@@ -83,6 +84,7 @@ class Found:
     posterior: Posterior
     forms: tuple[Remainder, ...] = ()
     options: tuple[Option, ...] = ()
+    outshone: Mapping[str, str] = field(default_factory=dict)
 
 
 def simulated(drives: Sequence[Drive], asked: Sequence[Hypothesis], model: Model, tell: Tell) -> Evidence:
@@ -139,10 +141,11 @@ def search(
     tell(f"{so_far}; comparing known effects", 0.55)
     if test.p_value > level:
         return Found(test, plain, gram, calibration, arena, posterior)
+    doubts = outshone(arena, posterior)
     arena, posterior = known
     tell(f"so far {_likeliest(arena, posterior)}; refitting in the simulator", 0.7)
     options = sorted(_refitted(evidence, arena, posterior, model), key=lambda o: -o.evidence)
-    return Found(test, plain, gram, calibration, arena, posterior, (), tuple(options))
+    return Found(test, plain, gram, calibration, arena, posterior, (), tuple(options), doubts)
 
 
 def _likeliest(arena: Arena, posterior: Posterior) -> str:

@@ -183,6 +183,10 @@ MECHANISMS: tuple[Mechanism, ...] = (
         _over("position", "t", ("v_x", "torque"), ("v_x", "water_depth"), without="a_x"),
     ),
     Mechanism(
+        "force_drag", "a drag that grows with the square of speed", "aero_drag", "m^2", 0.15, 0.02,
+        (("t",), ("position",)), family="force",
+    ),
+    Mechanism(
         "accelerometer", "an offset of the accelerometer", "accelerometer_bias@a_x", "m/s^2", 0.15, 0.005,
         _over("t", without="torque steer_angle yaw_rate water_depth"),
     ),
@@ -194,10 +198,10 @@ MECHANISMS: tuple[Mechanism, ...] = (
         "torque", "the torque at the wheels", "torque_gain", "-", 0.08, 0.01,
         _over("t", without="a_x steer_angle yaw_rate water_depth"), is_fast=True,
     ),
-    Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.035, _SLIP, is_fast=True,
-              family="slip"),
-    Mechanism("slip_r", "the slip slope of the rear axle", "slip_stiffness@r", "-", 0.3, 0.035, _SLIP, is_fast=True,
-              family="slip"),
+    Mechanism("slip_f", "the slip slope of the front axle", "slip_stiffness@f", "-", 0.3, 0.035, _SLIP,
+              is_fast=True, family="slip"),
+    Mechanism("slip_r", "the slip slope of the rear axle", "slip_stiffness@r", "-", 0.3, 0.035, _SLIP,
+              is_fast=True, family="slip"),
     Mechanism(
         "slip_all", "the slip slope of all driven wheels", "slip_stiffness", "-", 0.3, 0.035,
         _over(without="steer_angle ambient_temperature a_x water_depth"), family="slip",
@@ -206,7 +210,7 @@ MECHANISMS: tuple[Mechanism, ...] = (
     Mechanism("radius_r", "the radius of the rear wheels", "tyre_radius@r", "-", 0.005, 0.00035, _RADIUS),
     *(
         Mechanism(f"radius_{w}", f"the radius of the {PLACES[w]}", f"tyre_radius@{w}", "-", 0.01, 0.0005,
-                  (("v_x",), ("t",)), family="radius")
+                  (("v_x",), ("a_y",), ("t",)), family="radius")
         for w in WHEELS
     ),
     Mechanism(

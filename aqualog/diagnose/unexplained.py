@@ -27,12 +27,13 @@ from aqualog.diagnose.hypotheses import WORTH
 from aqualog.diagnose.records import SURE, Remainder, tempered
 from aqualog.diagnose.shapes import ALONG, MECHANISMS, Mechanism
 from aqualog.diagnose.unknown_term import ALIKE as SAME
-from aqualog.diagnose.unknown_term import describe
+from aqualog.diagnose.unknown_term import describe, form_of
 from aqualog.model.term import Model
 
-__all__ = ["MOST", "Clear", "clear_forms", "described", "slow_force", "unknown_forms"]
+__all__ = ["MOST", "Clear", "clear_forms", "described", "outshone", "slow_force", "unknown_forms"]
 
 AHEAD = 3.0  # [nats (natural logarithm)] that the best set must be ahead of the best one without unknown shapes
+OUTSHONE = 0.25  # probability beside unknown forms, below which an effect is not named (K)
 PART = 0.2  # of what the best set explains
 NEEDED = 12.0  # [nats] that the best set loses, with their prior, without forms of which each explains less
 WORTH_TELLING = 0.05  # of a channel's variance that a shape must explain
@@ -151,6 +152,19 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
         if is_large and share > WORTH_TELLING and form.cosine <= SAME:
             found.append(form)
     return tuple(found)
+
+
+def outshone(arena: Arena, posterior: Posterior) -> dict[str, str]:
+    """Effects in whose place a form stands in nearly all of the posterior, though not as clearly as it takes to report
+    it, by name, with the form in words."""
+    whole = fitted_in(arena.blocks, posterior.tolerant, posterior.best)
+    forms = [m for m in posterior.best if arena.blocks[m].kind == "shape"]
+    shown = [m for m in forms if _where(arena, (m,), posterior.best, whole)[1] > WORTH_TELLING]
+    if not shown:
+        return {}
+    words = form_of(arena.shapes[arena.blocks[shown[0]].tag])
+    names = {arena.name(i) for i, b in enumerate(arena.blocks) if b.kind == "effect"}
+    return {n: words for n in names if posterior.marginal.get(n, 0.0) < OUTSHONE}
 
 
 def _surely(field: Field, fit: Fitted, block: int, seed: int) -> float:

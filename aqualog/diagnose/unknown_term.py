@@ -11,12 +11,12 @@ import numpy as np
 from aqualog.core.records import FloatArray
 from aqualog.diagnose.channels import CHANNELS
 from aqualog.diagnose.records import Remainder
-from aqualog.diagnose.shapes import MECHANISMS, Mechanism
+from aqualog.diagnose.shapes import MECHANISMS, Mechanism, Shape
 from aqualog.diagnose.words import listed, name_of, quantity
 from aqualog.model.effects import EMPIRICAL
 from aqualog.model.term import Term
 
-__all__ = ["COORDINATES", "as_term", "describe", "short_form"]
+__all__ = ["COORDINATES", "as_term", "describe", "form_of", "short_form"]
 
 _CARRIED = ("force", ("v_x",))  # mechanism and coordinate that the plant has a table for
 TAPER = 0.08  # of the range: beyond the driven range, the function falls to zero over this share
@@ -128,6 +128,11 @@ def short_form(remainder: Remainder) -> str:
     title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), elsewhere)
     how = remainder.manner or f"that goes with {_over(remainder.depends_on, remainder.mechanism)}"
     return f"{title} {how}".strip()
+
+
+def form_of(shape: Shape) -> str:
+    """The same of a shape."""
+    return f"{shape.mechanism.title} {shape.manner or f'that goes with {_over(shape.coordinates)}'}"
 
 
 def _over(names: Sequence[str], mechanism: str | None = "") -> str:
