@@ -33,6 +33,7 @@ EDGES = 75  # of intervals, evenly over the drive
 OUTLIER = 6.0  # of the median size (4 standard deviations), beyond which a sample counts no more
 LASTS = 20  # [samples] to either side, of whose median it may be an outlier
 SHORTEST = 3  # edges outside of an interval, and from the drive's ends to what begins
+GUST = 40  # [samples] that an interval lasts at the least: gusts and kerbs last less (K)
 SHORTEST_S = 1.0  # of a change that begins, in blocks of 0.1 s, and of one that comes again after equal times
 INTERVALS, PART = 5, 0.1  # the most intervals of a form, each with this share of what the one before explains (K)
 AGAIN, AGAIN_STEP, PHASES = (1.5, 25.0), 0.03, 40  # times that patches come again over a drive; phases of one turn
@@ -215,10 +216,12 @@ def with_elements(arena: Arena) -> Arena:
 
     def of(s: tuple[Mechanism, FloatArray, FloatArray]) -> list[tuple[Mechanism, _Found]]:
         m, weight, score = s
-        several, both = intervals(weight, score), [looked.get((m.name, n), (None, None)) for n in along]
+        lasting = [x for x in intervals(weight, score) if x[1] - x[0] >= GUST]
+        several = lasting[: None if m.recurs else 1]
+        both = [looked.get((m.name, n), (None, None)) for n in along]
         found = [wave for wave, _ in both]
-        found += [_stepped(along["t"], several[:k]) for k in sorted({1, len(several)} - {0})]
-        found += [patches for _, patches in both]
+        found += [_stepped(along["t"], several[:k]) for k in sorted({min(1, len(several)), len(several)} - {0})]
+        found += [patches for _, patches in both if m.recurs]
         return [(m, f) for f in found if f is not None]
 
     return _extended(arena, list(chain.from_iterable(beside(of, sought))))

@@ -46,10 +46,11 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
         chosen, noises = best.option.refit, [w.noise for w in found.posterior.weighings]
         if chosen is None:
             return ()
+        instead = [(found.outshone[c.name], c) for c in best.large if c.name in found.outshone]
         doubts = [
-            f"{found.outshone[c.name]} explains the log better than {name_of(c.effect, c.where)}."
-            for c in best.large if c.name in found.outshone
-        ]  # fmt: skip
+            f"{form[:1].upper()}{form[1:]} explains the log better than {name_of(c.effect, c.where)}."
+            for form, c in instead
+        ]
         # a member that is too small to be worth naming is not named: its sign says nothing against the others
         return *doubts, *repeats(chosen, found.arena, noises, {(c.key, "".join(c.drives)) for c in best.large})
 

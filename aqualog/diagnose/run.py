@@ -18,7 +18,7 @@ from aqualog.diagnose.arena import by_drives, competing
 from aqualog.diagnose.channels import CHANNELS, block_step, contrasts
 from aqualog.diagnose.competition import COARSE
 from aqualog.diagnose.consequence import consequences
-from aqualog.diagnose.drive import ON_WATER, Drive, calm, led_by, prepare
+from aqualog.diagnose.drive import ON_WATER, Drive, calm, floating, led_by, prepare
 from aqualog.diagnose.evidence import SURROGATES, Evidence, around_water, recentred, tolerant
 from aqualog.diagnose.faster import Late, faster, found_late, joined, with_rings
 from aqualog.diagnose.file_values import in_words, not_calibrated, with_known
@@ -405,7 +405,9 @@ def accelerometer_defect(drive: Drive) -> Follow | None:
     speeds = [drive.speed]
     if wheels:
         speeds.append(np.mean([drive.vehicle.r_e(n[-2:]) * drive.columns[n] for n in wheels], axis=0))
-    found = [follow(a, v, np.isfinite(a) & np.isfinite(v), drive.dt) for v in speeds]
+    # nor where a wheel floats: the velocity of many references is that of two wheels
+    rolls = np.isfinite(a) & ~floating(drive.columns, drive.speed, drive.vehicle, drive.course, ())
+    found = [follow(a, v, rolls & np.isfinite(v), drive.dt) for v in speeds]
     moved = [f for f in found if f is not None and f.motion >= LEAST_MOTION]
     if any(f.correlation >= LEAST_CORRELATION and LEAST_GAIN <= f.gain <= MOST_GAIN for f in moved):
         return None

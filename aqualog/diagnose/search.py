@@ -73,8 +73,8 @@ class Option:
 class Found:
     """Inner products (K + 1, K + 1), `plain` and in `gram` with tolerances, and `calibration` describe what the log can
     distinguish. With unknown `forms`, `arena` and `posterior` are those of all that competes and there are no
-    `options`. Else they are those of known effects, and `options` the sets with what they gain; `outshone`: effects that a form makes unlikely, by name, with the
-    form."""
+    `options`. Else they are those of known effects, and `options` the sets with what they gain; `outshone`: effects
+    that a form makes unlikely, by name, with the form."""
 
     significance: Significance
     plain: FloatArray

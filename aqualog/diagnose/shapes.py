@@ -145,6 +145,7 @@ class Mechanism:
     is_fast: bool = False  # it multiplies a fast signal: over time and place a smooth function is more than slow noise
     scales: str = ""
     family: str = ""
+    recurs: bool = True  # several intervals and patches may be of it, as gusts are of a drag
 
     @property
     def is_whole(self) -> bool:
@@ -184,7 +185,7 @@ MECHANISMS: tuple[Mechanism, ...] = (
     ),
     Mechanism(
         "force_drag", "a drag that grows with the square of speed", "aero_drag", "m^2", 0.15, 0.02,
-        (("t",), ("position",)), family="force",
+        (("t",), ("position",)), family="force", recurs=False,
     ),
     Mechanism(
         "accelerometer", "an offset of the accelerometer", "accelerometer_bias@a_x", "m/s^2", 0.15, 0.005,

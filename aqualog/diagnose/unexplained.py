@@ -41,6 +41,8 @@ LEAST = {"m/s^2": 0.01, "m/s": 0.02, "N": 20.0}  # rms of what is large, by the 
 # share of these from which a function that is certain counts: on drives without effects slips over the torque of 0.008
 # to 0.010 m/s were certain, of hidden ones 0.0175 (D)
 LITTLE = 0.5
+LITTLE_ELSEWHERE = 0.3  # the same over coordinates along which simulators have no offsets (D)
+PLAIN = 0.15  # of a channel's variance: a force that explains this much is no offset in one kind of driving (D)
 ALIKE = 0.2  # share of the best one's probability from which the drive cannot distinguish another coordinate or axle
 ERRS = frozenset({*TOLERATED, "since_braking", *ALONG})  # coordinates along which simulators have offsets
 _SLIPS = tuple(f"slip_{w}" for w in WHEELS)
@@ -148,7 +150,8 @@ def unknown_forms(arena: Arena, posterior: Posterior, *, seed: int) -> tuple[Rem
         sure = math.inf if form.manner else _surely(arena, fit, c.first, seed)
         allowed = arena.mechanism(c.first).allowed
         is_sure = not form.manner and sure >= WORTH * allowed
-        is_large = size > (LITTLE if is_sure else 1.0) and sure > allowed
+        little = LITTLE if ERRS.intersection(form.depends_on) else LITTLE_ELSEWHERE
+        is_large = size > (little if is_sure else 1.0) and sure > allowed
         if is_large and share > WORTH_TELLING and form.cosine <= SAME:
             found.append(form)
     return tuple(found)
@@ -190,7 +193,8 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
 
     Between axles and sides the reference velocity's noise, which is in the slip of all wheels, cancels. What the wheels
     do must show in their slip. A smooth function of speed, torque or braking must explain some of the variance where
-    half of its energy is, too: else it is an offset in one kind of driving, as simulators have it.
+    half of its energy is, too: else it is an offset in one kind of driving, as simulators have it. A force that
+    explains much of a channel is none.
     """
     channels = arena.parts[0].channels
     names, turned = _with_differences(channels)
@@ -203,9 +207,10 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
     y, f = np.concatenate(left, axis=1), np.concatenate(made, axis=1)
     share = _share(y, f, np.ones_like(f))
     rms = np.sqrt((f**2).mean(axis=1))
-    own = [arena.shapes[arena.blocks[m].tag] for m in members]
+    own, is_force = [arena.shapes[arena.blocks[m].tag] for m in members], arena.mechanism(members[0]).name == "force"
     if not any(s.manner for s in own) and any(ERRS.intersection(s.coordinates) for s in own):
-        share = np.where(_share(y, f, np.abs(f) >= _most(f)) > 0.0, share, 0.0)
+        varies = _share(y, f, np.abs(f) >= _most(f)) > 0.0
+        share = np.where(varies | (is_force & (share > PLAIN)), share, 0.0)
     size = [float(r / LEAST[CHANNELS[c].unit]) for r, c in zip(rms, names, strict=True)]
     of_wheels = arena.mechanism(members[0]).name.startswith(("slip", "radius"))
     every = [x for x in zip(size, share.tolist(), names, strict=True) if not of_wheels or "slip" in x[2]]

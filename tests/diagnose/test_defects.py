@@ -73,6 +73,20 @@ def test_noise_of_one_speed_alone_is_no_defect_of_the_accelerometer(own):
 
 
 @pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_velocity_of_wheels_that_float_is_no_defect_of_the_accelerometer(sign):
+    """Two wheels give the velocity, spin down on water and recover, several times; the car hardly slows down."""
+    log = plain()
+    t = log.array("t")
+    wet = (t % 30.0 > 5.0) & (t % 30.0 < 11.0)
+    # to a tenth of the speed within a second, and back
+    left = 1.0 - 0.9 * np.clip(np.minimum(t % 30.0 - 6.0, 10.0 - t % 30.0), 0.0, 1.0)
+    own = {c: log.array(c) * left for c in ("v_x", "omega_rl", "omega_rr")}
+    own |= {f"water_depth_{s}": 2e-3 * wet for s in ("left", "right")} | {"a_x": sign * log.array("a_x")}
+    d = prepare(changed(log, log.frame.with_columns(pl.Series(c, x) for c, x in own.items())), CAR, "a")
+    assert (accelerometer_defect(d) is None) == (sign > 0.0)
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
 def test_stretches_that_the_torque_does_not_explain_count_too(sign):
     log = plain()
     d = prepare(changed(log, log.frame.with_columns(pl.col("a_x") * sign)), CAR, "a")

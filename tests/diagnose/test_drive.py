@@ -131,6 +131,52 @@ def test_the_time_since_braking_counts_from_its_end():
     assert "since_braking" not in prepare(plain(), CAR, "a").coordinates
 
 
+BRAKING = 3000, 5000  # samples
+
+
+def braked(drivetrain, **columns):
+    """The coordinate on a drive that keeps its speed, with columns that have a value of their own while braking."""
+    car, on = replace(CAR, drivetrain=drivetrain), np.arange(plain().frame.height)
+    on = (on >= BRAKING[0]) & (on < BRAKING[1])
+    frame = (
+        plain()
+        .frame.drop("brake_pressure")
+        .with_columns(pl.Series(n, np.where(on, x, other)) for n, (x, other) in columns.items())
+    )
+    return prepare(changed(plain(), frame), car, "a").coordinates.get("since_braking")
+
+
+def torques(front, rear, *, other=(20.0, 20.0)):
+    return {f"torque_{w}": (front if w[0] == "f" else rear, other[0] if w[0] == "f" else other[1]) for w in WHEELS}
+
+
+@pytest.mark.parametrize(
+    ("drivetrain", "columns", "brakes"),
+    [
+        ("rwd", {"brake_pressure": (1e5, 0.0)}, True),
+        ("rwd", {"brake_pressure": (0.4e5, 0.0)}, False),
+        # of wheels that nothing drives: 0.03 m/s^2 of the car, from what the log has there else
+        ("rwd", torques(8.0, 40.0), True),
+        ("rwd", torques(16.0, -150.0), False),
+        ("fwd", torques(40.0, 8.0), True),
+        ("awd", torques(8.0, 40.0), False),
+        # an engine slows no car by 0.4 m/s^2
+        ("awd", torques(-80.0, -40.0), True),
+        ("awd", torques(-40.0, -40.0), False),
+        # the pressure is the better witness
+        ("rwd", torques(8.0, 40.0) | {"brake_pressure": (0.0, 0.0)}, False),
+    ],
+)
+def test_brakes_show_by_their_pressure_or_by_torque_that_no_engine_makes(drivetrain, columns, brakes):
+    at = braked(drivetrain, **columns)
+    if not brakes:
+        assert at is None
+        return
+    assert (at[302:498] == -15.0).all()
+    assert at[290] == pytest.approx(60.0)
+    assert at[600] == pytest.approx(10.0, abs=0.2)
+
+
 def test_braking_is_left_out_where_the_torque_does_not_hold_it():
     log = signals(speed=((0.0, 24.0), (30.0, 24.0), (33.0, 18.0), (90.0, 18.0)))
     p = np.where(np.arange(log.frame.height) // 300 == 10, 10e5, 0.0)

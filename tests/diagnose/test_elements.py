@@ -48,6 +48,21 @@ def test_a_force_that_comes_and_goes(rise):
         assert "Without a second pass" in r.sentence
 
 
+@pytest.mark.parametrize("power", [0, 2])
+def test_a_drag_that_comes_and_goes_is_no_force_that_does(power):
+    """In the same interval, of the same size at 22 m/s: with a roof box for a while, or a brake that binds."""
+    _, _, (r,) = found(
+        13, lambda c: 250.0 * (c["v_x"] / 22.0) ** power * trapezoid(c["t"], 60.0, 190.0, 0.1)
+    )  # fmt: skip
+    assert (r.mechanism, r.unit, r.depends_on) == (
+        ("force_drag", "m^2", ("t",)) if power else ("force", "N", ("t",))
+    )  # fmt: skip
+    if power:
+        assert np.nanmax(r.f) == pytest.approx(250.0 / (0.6 * 22.0**2), rel=0.1)
+        assert short_form(r).startswith("a drag that grows with the square of speed from ")
+        assert re.search(r"; \+0\.8\d* m² at \d+", r.sentence)
+
+
 def test_a_wave_of_the_road():
     _, _, forms = found(12, lambda c: 150.0 * np.sin(2.0 * np.pi * c["position"] / 310.0 + 0.7))
     assert [(r.mechanism, r.depends_on) for r in forms] == [("force", ("position",))]
@@ -107,6 +122,12 @@ def test_a_kerb_is_no_form():
     assert forms == ()
 
 
+@pytest.mark.parametrize(("lasts", "count"), [(3.0, 0), (5.0, 1)])
+def test_gusts_are_no_form(lasts, count):
+    _, _, forms = found(19, lambda c: 500.0 * sum(trapezoid(c["t"], b, b + lasts, 0.1) for b in (42.0, 103.0, 197.0)))
+    assert [(r.mechanism, r.depends_on) for r in forms] == [("force", ("t",))] * count
+
+
 def test_a_known_effect_beside_an_interval():
     _, p, forms = found(17, lambda c: 200.0 * trapezoid(c["t"], 60.0, 120.0, 0.1), aero_drag=0.3)
     assert [r.depends_on for r in forms] == [("t",)]
@@ -117,10 +138,12 @@ def test_the_blocks_pay_for_all_that_were_tried():
     a = with_elements(arena(18))
     own = [b for b in a.blocks if " of " in b.key]
     kinds = ("wave of t", "wave of position", "interval of t", "intervals of t", "patches of t", "patches of position")
-    assert {b.key for b in own} == {f"force({k})" for k in kinds}
+    usual = {"force": 150.0, "force_drag": 0.15}
+    assert {b.key for b in own} == {f"{m}({k})" for m in usual for k in kinds if m == "force" or "s of" not in k}
     smooth = max(b.log_prior for b in a.blocks if b.kind == "shape" and b not in own)
     assert max(b.log_prior for b in own) < smooth - 3.0
-    assert all(a.sd[list(b.columns)].tolist() == [150.0] * len(b.columns) for b in own)
+    for b in own:
+        assert set(a.sd[list(b.columns)].tolist()) == {usual[b.key.partition("(")[0]]}
 
 
 def test_deviations_beside_which_forms_are_sought_are_those_of_a_car(monkeypatch):

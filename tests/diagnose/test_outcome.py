@@ -89,6 +89,19 @@ def test_beside_an_unknown_form_nothing_is_certain_and_nothing_stands_at_a_bound
     assert o.causes[0].probability == 0.75
 
 
+def test_a_name_that_a_form_outshines_is_not_certain():
+    def with_form(name):
+        found = Found(SimpleNamespace(), np.zeros((1, 1)), np.zeros((1, 1)), SimpleNamespace(), ARENA, POSTERIOR, (),
+                      (option(payload_mass=200.0), Option((), 0.0)), {name: "a force on the car that goes with yaw rate"})  # fmt: skip
+        return conclude(found, Model())
+
+    o = with_form("payload_mass")
+    assert (o.verdict, names(o), o.certain) == ("cannot_tell", ["payload_mass"], frozenset())
+    assert o.causes[0].probability <= 0.9
+    assert any("A force on the car that goes with yaw rate explains the log better than" in n for n in o.notes)
+    assert with_form("aero_drag").verdict == "named"
+
+
 def test_an_interval_ends_at_the_physical_bound():
     assert told(option(road_grade=0.19)).causes[0].parameters["grade"].high == 0.2
 
