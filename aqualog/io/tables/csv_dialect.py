@@ -15,7 +15,7 @@ from itertools import takewhile
 from typing import Literal
 
 from aqualog.core.errors import LogError
-from aqualog.core.units import is_unit
+from aqualog.core.units import is_unit, parse_unit
 from aqualog.io.reader import CsvFormat, csv_hint
 from aqualog.io.tables.columns import split_unit, unique_names
 from aqualog.io.tables.csv_cells import STYLES, Style, is_bad, is_clock, is_date, is_number, is_stamp
@@ -48,7 +48,7 @@ class Column:
     """One column by its header and its sampled cells; `texts` of `sampled` filled ones are no value.
 
     `name` is unique in the file, `header` what stands above it. `is_grouped`: other columns show that its sign is one
-    between thousands.
+    between thousands. `other_unit`: what the row of units says, where the header says something else.
     """
 
     index: int
@@ -61,6 +61,7 @@ class Column:
     header: str = ""
     sampled: int = 0
     is_grouped: bool = False
+    other_unit: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -292,13 +293,19 @@ def _columns(
         style = _with_thousands(column, alone, proven)
         kind = _kind(column, style)
         header, unit = split[k]
+        count, other = len(column.cells), below[k] if _differ(unit, below[k]) else ""
         columns.append(
-            Column(k, paths[k], unit or below[k], style, *kind, header or paths[k], len(column.cells), style != alone)
+            Column(k, paths[k], unit or below[k], style, *kind, header or paths[k], count, style != alone, other)
         )
     foreign = [c.cells[0] for c, own in zip(cells, columns, strict=True) if _is_foreign(c, own, proven)]
     if foreign:
         return tuple(columns), foreign[0]
     return tuple(columns), "" if decimal or order[0].thousands else _unproven_cell(cells, columns)
+
+
+def _differ(one: str, other: str) -> bool:
+    """Whether two known spellings mean different units."""
+    return is_unit(one) and is_unit(other) and parse_unit(one) != parse_unit(other)
 
 
 def _told_styles(columns: Sequence[_Cells], decimal: str) -> tuple[Style, ...]:

@@ -97,6 +97,14 @@ def test_tab_units_row_t_ms_utf16(read, encoding):
     assert log["Druck"] == [2.1, 2.2]
 
 
+@pytest.mark.parametrize(("below", "is_noted"), [("m/s", True), ("kph", False), ("", False), ("km/h", False)])
+def test_a_row_of_units_that_contradicts_the_header_is_noted(read, below, is_noted):
+    log = read(f"t [s],v_x [km/h],torque\ns,{below},N*m\n" + "0.1,36,5\n0.2,37,6\n")
+    assert log.units == {"v_x": "km/h", "torque": "N*m"}
+    assert log.noted('"v_x"', "in km/h, as its header says", "row of units says m/s") == is_noted
+    assert bool(log.faults.notes) == is_noted
+
+
 def test_one_damaged_byte_does_not_change_the_names(read):
     raw = ("t [s],Öl [°C],v\n" + table(200, line=lambda k: (f"{k / 100:.2f}", "80", "7"))).encode()
     damaged = raw.replace(b"0.77,80", b"0.77,8\xff")
