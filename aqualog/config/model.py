@@ -19,8 +19,8 @@ _KNOWN = {**EFFECTS, **EMPIRICAL}
 def load_model(path: Path) -> Model:
     """Read and check a model file: `[[term]]` tables with `effect`, where it sits (`where`) and its parameters, SI.
 
-    A parameter that is left out keeps its neutral value; a file without terms gives the base model. An effect that is a
-    function has `knots = [[x, value], ...]`.
+    `vehicle` is the name of the car that it was found on. A parameter that is left out keeps its neutral value; a file
+    without terms gives the base model. An effect that is a function has `knots = [[x, value], ...]`.
 
     Raises
     ------
@@ -28,8 +28,8 @@ def load_model(path: Path) -> Model:
         With all faults of the file in one message.
     """
     file = read(path, "model file")
-    file.check_names("term")
-    model = Model()
+    file.check_names("term", "vehicle")
+    model = Model(car=str(file.get("vehicle", "")))
     for table in file.tables("term"):
         term = _term(table)
         if term is None:
@@ -88,7 +88,8 @@ def _effect(table: Table) -> Effect | None:
 
 def dump_model(model: Model) -> str:
     """Return the TOML text of a model; `load_model` reads it back equal."""
-    return "\n".join(_term_text(t) for t in model.terms)
+    head = [f"vehicle = {json.dumps(model.car, ensure_ascii=False)}\n"] if model.car else []
+    return "\n".join([*head, *map(_term_text, model.terms)])
 
 
 def _term_text(term: Term) -> str:

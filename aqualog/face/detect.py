@@ -295,7 +295,7 @@ def detect(
         from aqualog.config.thresholds import load_settings
 
         settings = load_settings(file_of(thresholds, "thresholds"))
-    known = model_of(model)
+    known = model_of(model, car, hear)
     asked = (("writing a log", whole), ("a model", known is not None), ("a history", history is not None))
     needs = ", ".join(n for n, is_asked in asked if is_asked)
     key = ""
@@ -407,13 +407,16 @@ def _write_log(found: DriveResult, path: Path, suffix: str, *, first_row: int = 
     )  # fmt: skip
 
 
-def model_of(model: PathLike | Model | None) -> Model | None:
-    """Return the model behind an argument."""
+def model_of(model: PathLike | Model | None, car: Vehicle | None = None, hear: Listener | None = None) -> Model | None:
+    """Return the model behind an argument, with a note where it was found on another car."""
     if model is None:
         return None
     from aqualog.model.term import Model
 
-    return model if isinstance(model, Model) else Model.read(file_of(model, "model", "aq.Model"))
+    found = model if isinstance(model, Model) else Model.read(file_of(model, "model", "aq.Model"))
+    if car is not None and hear is not None and found.car not in ("", car.name):
+        hear.note(f'the model was found on "{found.car}", and the vehicle file is of "{car.name}"')
+    return found
 
 
 def _memory(history: PathLike | None, configuration: str, reference: str) -> Memory:

@@ -196,7 +196,8 @@ def _model_text(found: Found, vehicle: str) -> str:
         head.append("No term: this is the base model.")
     # a name may hold anything, a comment ends with its line
     lines = ["# " + "".join(c if c.isprintable() else "\ufffd" for c in " ".join(text.split())) for text in head]
-    return "\n".join(lines) + "\n\n" + dump_model(found.model)
+    name = "".join(c for c in vehicle if c.isprintable())
+    return "\n".join(lines) + "\n\n" + dump_model(replace(found.model, car=name))
 
 
 def diagnose(
@@ -262,11 +263,11 @@ def diagnose(
             raise ConfigError("holdout beside a campaign", expected="drives, or a campaign alone")
         return _of_campaign(campaign, model, options, hear)
     assert not isinstance(drives, Campaign | CampaignRuns)
-    known = model_of(model)
     named, held = drives_of(drives), drives_of(holdout, is_needed=False)
     check_apart(named, held)
     own, unseen = with_own_names(named, held)
     car = vehicle_needed(vehicle, own[0] if own else None)
+    known = model_of(model, car, hear)
     loaded = load_drives([*own, *unseen], car, hear)
     names = [d.label for d in unseen]
 

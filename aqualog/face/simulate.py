@@ -187,7 +187,7 @@ def simulate(
         scenario, name = load_scenario(path), path.stem
     if seed is not None:
         scenario = replace(scenario, seed=whole_number(seed, "seed", 0, 2**63 - 1))
-    known = model_of(model) or Model()
+    known = model_of(model, scenario.vehicle, hear) or Model()
     named = ""
     if isinstance(model, str | Path):
         sources.append(Path(model))

@@ -152,10 +152,10 @@ def validate(
     if text_of(method, "method") not in METHODS:
         raise ConfigError(f'method "{method}"', expected=" or ".join(METHODS))
     plan = _plan(boundaries)
-    known = model_of(model)
     named = drives_of(drives)
     (own,) = with_own_names(named)
     car = vehicle_needed(vehicle, own[0] if own else None)
+    known = model_of(model, car, hear)
     loaded = load_drives(own, car, hear)
 
     def work(signals: dict[str, Signals]) -> Validity:

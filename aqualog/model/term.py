@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -269,9 +269,10 @@ class Term:
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """The base simulation and the terms on top of it, in order."""
+    """The base simulation and the terms on top of it, in order; `car`: name of the one it was found on, if known."""
 
     terms: tuple[Term, ...] = ()
+    car: str = field(default="", compare=False)
 
     @classmethod
     def read(cls, path: str | Path) -> Model:
@@ -297,7 +298,7 @@ class Model:
         if any((t.effect, t.place, t.drive) == (term.effect, term.place, term.drive) for t in self.terms):
             place = f" at {term.place}" if term.place else ""
             raise ConfigError(f"{term.effect.name}{place} is in the model already", hint="one term with the sum")
-        return Model((*self.terms, term))
+        return replace(self, terms=(*self.terms, term))
 
     def of(self, drive: str) -> Model:
         """Return the model of a drive by its name, without the terms of others; of no name: what all drives share."""

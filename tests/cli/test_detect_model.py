@@ -61,6 +61,14 @@ def test_what_the_detectors_do_not_use_is_told(tmp_path):
     assert document["model"][0]["effect"] == "tone_ring"
 
 
+@pytest.mark.parametrize(("car", "is_noted"), [("van", True), (load_vehicle(SAMPLES / "vehicle.toml").name, False)])
+def test_a_model_of_another_car_is_noted(tmp_path, car, is_noted):
+    (tmp_path / "model.toml").write_text(dump_model(Model(car=car)))
+    result = run("detect", MF4, "--vehicle", CAR, "--model", tmp_path / "model.toml")
+    assert result.exit_code == 0, result.stderr
+    assert ('the model was found on "van"' in " ".join(result.stderr.split())) == is_noted
+
+
 def test_faults_of_the_model_file(tmp_path):
     (tmp_path / "model.toml").write_text('[[term]]\neffect = "payload"\n')
     result = run("detect", MF4, "--vehicle", CAR, "--model", tmp_path / "model.toml")

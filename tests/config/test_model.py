@@ -37,6 +37,14 @@ effect = "tyre_warmup"
         )
     )
     assert load(tmp_path, "# nothing\n") == Model()
+    assert load(tmp_path, "# nothing\n").car == ""
+
+
+@pytest.mark.parametrize("name", ["", "BMW i3", '"a" \\ Ö 車 😀'])
+def test_the_car_of_a_model_is_read_back(tmp_path, name):
+    term = Term(EFFECTS["payload_mass"], {"delta_mass": 262.0})
+    model = load(tmp_path, dump_model(Model(car=name).with_term(term)))
+    assert (model.car, model.terms) == (name, (term,))
 
 
 def test_faults_of_a_model_come_together(tmp_path):

@@ -55,6 +55,7 @@ def test_files_are_those_of_the_command(folder):
     assert before["diagnosis.json"].decode() == command(*args, "--json")[0]
     assert {n: (out / n).read_bytes() for n in FILES} == before
     assert aq.Model.read(out / "model.toml") == drawn.model
+    assert aq.Model.read(out / "model.toml").car == drawn.vehicle_name
     assert drawn.write_model(folder / "m.toml").read_bytes() == before["model.toml"]
     assert drawn.write_page(str(folder / "p.html")).exists()
     with pytest.raises(aq.AqualogError, match="source of this very run"):

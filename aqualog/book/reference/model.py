@@ -182,7 +182,8 @@ _EFFECTS = "A model file lists effects on top of the base simulation, each with 
 _EFFECTS_HOW = """
 `aqualog diagnose -o model.toml` writes one. `simulate`, `detect` and `diagnose` take it with `--model model.toml`. A
 parameter that is left out is neutral, and a neutral effect changes no bit of a drive. Values outside the bounds are
-errors.
+errors. `vehicle = "..."` before the first table is the car that the model was found on: with another one, a note says
+so.
 
 `where` names the place: a wheel (`fl`), an axle (`f`, `r`), a side (`left`, `right`) or a signal (`a_x`). An effect
 without a place acts on the whole car.
