@@ -194,7 +194,7 @@ def _where(arena: Arena, members: Sequence[int], best: Sequence[int], fit: Fitte
     Between axles and sides the reference velocity's noise, which is in the slip of all wheels, cancels. What the wheels
     do must show in their slip. A smooth function of speed, torque or braking must explain some of the variance where
     half of its energy is, too: else it is an offset in one kind of driving, as simulators have it. A force that
-    explains much of a channel is none.
+    explains much of a channel counts in any case.
     """
     channels = arena.parts[0].channels
     names, turned = _with_differences(channels)

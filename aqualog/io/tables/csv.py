@@ -477,12 +477,8 @@ class CsvReader(TableReader):
             what = f'whether "{self._layout.unproven}" is a fraction or thousands is not proven; taken as a fraction'
             self._note(f"{what} ({csv_hint('decimal')})")
         for column in self._layout.columns:
-            if column.is_grouped:
-                what = f'column "{column.name}": "{column.style.thousands}" is between thousands, since other columns'
-                self._note(f"{what} have the other sign before fractions ({csv_hint('decimal')})")
-            if column.other_unit:
-                what = f'column "{column.name}" is taken in {column.unit}, as its header says'
-                self._note(f"{what}; the row of units says {column.other_unit} (a unit in the signal map decides)")
+            for remark in column.remarks:
+                self._note(f'column "{column.name}"{remark}')
         for name in self._layout.twice:
             self._note(f'several columns are called "{name}": "{name}", "{name}#2" and so on in a map')
         for column in self._layout.columns:

@@ -63,6 +63,18 @@ class Column:
     is_grouped: bool = False
     other_unit: str = ""
 
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader should know of it; each goes on behind its name."""
+        out = []
+        if self.is_grouped:
+            what = f': "{self.style.thousands}" is between thousands, since other columns'
+            out.append(f"{what} have the other sign before fractions ({csv_hint('decimal')})")
+        if self.other_unit:
+            what = f" is taken in {self.unit}, as its header says; the row of units says {self.other_unit}"
+            out.append(f"{what} (a unit in the signal map decides)")
+        return tuple(out)
+
 
 @dataclass(frozen=True, slots=True)
 class Layout:
