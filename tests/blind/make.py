@@ -68,9 +68,12 @@ def write(folder: Path, case: Case, world: str, seed: int) -> None:
     seal(folder, {"effects": [], "unknown": None, **rest, "world": world, "seed": seed})
 
 
+APART = 1000  # drives of a seed: with fewer, the next seed would have most of the same ones
+
+
 def specs(kind: str, seed: int) -> Iterator[Spec]:
-    """Specs of one kind without end: effects, sizes, noises, programmes and cars in turn, from the seed on."""
-    cars, i = list(CARS), seed
+    """Specs of one kind without end: effects, sizes, noises, programmes and cars in turn; no two seeds share a drive."""
+    cars, i = list(CARS), APART * seed
     while True:
         k, car = i // 7, cars[i % len(cars)]
         noise = NOISES[(3 * i + i // 10) % len(NOISES)]

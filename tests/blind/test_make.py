@@ -1,5 +1,7 @@
 """Sealed cases of the simulated worlds: what stands in a folder, and how visible its effect is."""
 
+from itertools import islice
+
 import numpy as np
 import polars as pl
 import pytest
@@ -64,6 +66,12 @@ def test_plain_cases(tmp_path):
         assert not frames[0]["v_x"].equals(frames[1]["v_x"])
     with pytest.raises(SystemExit, match="no unknown forms"):
         make.plain_case(0, 4, "unknown", 20.0, rng)
+
+
+@pytest.mark.parametrize("kind", ["null", "known", "unknown", "compound"])
+def test_no_two_seeds_share_a_drive(kind):
+    seeds = [{s.seed for s in islice(make.specs(kind, seed), 400)} for seed in (3801, 3802, 3803)]
+    assert len(set().union(*seeds)) == 3 * 400
 
 
 def test_magic_case_of_a_form_says_how_it_acts():
