@@ -41,10 +41,8 @@ SETTLES_S = 2.0  # [s] after a gear shift, until the body no longer pitches (K)
 SHIFTS_MOST = 0.3  # [-] of the drive: beyond, the torque is noisy
 FORCE_MIN = 0.02  # [m/s^2] of drive: a car that is driven is not braked
 BRAKES, LONG_AGO_S = -0.8, 60.0  # [m/s^2], [s] braking, and when it has been long ago
-BRAKED, BRAKED_ALL = (
-    0.03,
-    0.4,
-)  # [m/s^2] of all wheels that are not driven, and of a car with none, when brakes are on (K)
+# [m/s^2] of all wheels that are not driven, and of a car without such, when brakes are on (K)
+BRAKED, BRAKED_ALL = 0.03, 0.4
 WHILE_S = -15.0  # [s] in place of it while braking: far enough to act as it does after it, or not at all
 ROLLS_OUT = 0.15  # [m/s^2] a slope of 1.5 %, so that a road does not count as a brake
 # slip of a wheel beyond its grip: a wet tyre's force has its largest value at 0.08 to 0.2 (D: 3 mu / C), and driving
