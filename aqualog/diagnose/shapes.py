@@ -184,7 +184,7 @@ MECHANISMS: tuple[Mechanism, ...] = (
         _over("position", "t", ("v_x", "torque"), ("v_x", "water_depth"), without="a_x"),
     ),
     Mechanism(
-        "force_drag", "a drag that grows with the square of speed", "aero_drag", "m^2", 0.15, 0.02,
+        "force_drag", "a drag with the square of speed", "aero_drag", "m^2", 0.15, 0.02,
         (("t",), ("position",)), family="force", recurs=False,
     ),
     Mechanism(

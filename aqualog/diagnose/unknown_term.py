@@ -91,7 +91,9 @@ def describe(mechanism: Mechanism, r: Remainder, instead: Sequence[Mechanism] = 
     sure = np.isfinite(r.high) & ((r.low > 0.0) | (r.high < 0.0))  # a band without an end says no size
     if sure.any():
         # the largest one may stand at an end, where hardly anybody drove
-        at = int(np.argmax(np.where(sure, np.abs(r.f) / (r.high - r.low), -1.0)))
+        rank = np.where(sure, np.abs(r.f) / (r.high - r.low), -1.0)
+        # of an interval all values are as sure, those on its slopes too
+        at = int(np.argmax(np.where(rank > 0.999 * rank.max(), np.abs(r.f), -1.0)))
         near = [_place(v, x) for v, x in zip(r.x[at].tolist(), r.x.T, strict=True)]
         there = ", ".join(f"{v} {COORDINATES[n].unit}" for n, v in zip(r.depends_on, near, strict=True))
         text += f"; {_size(mechanism, float(r.f[at]))} at {there}"
@@ -126,13 +128,16 @@ def short_form(remainder: Remainder) -> str:
     """`a force on the car that goes with speed`, `a force on the car from 66 s to 145 s`."""
     elsewhere = "" if remainder.manner else remainder.channel
     title = next((m.title for m in MECHANISMS if m.name == remainder.mechanism), elsewhere)
-    how = remainder.manner or f"that goes with {_over(remainder.depends_on, remainder.mechanism)}"
-    return f"{title} {how}".strip()
+    return _short(title, remainder.manner, remainder.depends_on, remainder.mechanism)
 
 
 def form_of(shape: Shape) -> str:
     """The same of a shape."""
-    return f"{shape.mechanism.title} {shape.manner or f'that goes with {_over(shape.coordinates)}'}"
+    return _short(shape.mechanism.title, shape.manner, shape.coordinates, shape.mechanism.name)
+
+
+def _short(title: str, manner: str, names: Sequence[str], mechanism: str | None) -> str:
+    return f"{title} {manner or f'that goes with {_over(names, mechanism)}'}".strip()
 
 
 def _over(names: Sequence[str], mechanism: str | None = "") -> str:

@@ -20,9 +20,9 @@ from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.noise import weighing, white_noise
 from aqualog.diagnose.records import Remainder
 from aqualog.diagnose.run import Options, diagnose
-from aqualog.diagnose.shapes import MECHANISMS
+from aqualog.diagnose.shapes import MECHANISMS, Shape
 from aqualog.diagnose.unexplained import LEAST, unknown_forms
-from aqualog.diagnose.unknown_term import as_term
+from aqualog.diagnose.unknown_term import as_term, describe, form_of, short_form
 from aqualog.model.scenario import Scenario
 from aqualog.model.simulate import assemble
 from aqualog.model.term import Model
@@ -245,11 +245,32 @@ def test_a_hump_of_another_simulator_is_unexplained(monkeypatch):
     assert any("A force on the car that goes with speed explains the log better than" in n for n in found.notes)
 
 
+@pytest.mark.parametrize(
+    ("mechanism", "over", "manner", "said"),
+    [
+        ("torque", "torque", "", "the torque at the wheels that goes with its own size"),
+        ("force", "torque", "", "a force on the car that goes with torque"),
+        ("force_drag", "t", "from 3 s to 9 s", "a drag with the square of speed from 3 s to 9 s"),
+    ],
+)
+def test_a_shape_and_its_remainder_have_the_same_words(mechanism, over, manner, said):
+    shape = Shape(next(m for m in MECHANISMS if m.name == mechanism), (over,), None, manner)
+    assert form_of(shape) == said
+    own = replace(remainder([0.0, 1.0], np.ones(2), mechanism=mechanism, depends_on=(over,)), manner=manner)
+    assert short_form(own) == said
+
+
 def remainder(x, f, half=10.0, mechanism="force", depends_on=("v_x",)):
     x = np.asarray(x, dtype=float)[:, None]
     return Remainder(
         "force_balance", depends_on, 0.3, 0.01, x, f, f - half, f + half, (), None, 0.0, "", mechanism, "N", 0.99
     )  # fmt: skip
+
+
+def test_a_sentence_says_the_plateau_of_an_interval_and_not_its_slope():
+    f = np.array([50.0, 120.0, 200.0, 200.0])
+    r = remainder([10.0, 11.0, 12.0, 13.0], f, 0.1 * f, depends_on=("t",))
+    assert "200 N against the motion at 12 s" in describe(next(m for m in MECHANISMS if m.name == "force"), r)
 
 
 def test_a_force_over_speed_becomes_a_term():
