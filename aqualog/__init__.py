@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from aqualog.face.watch import watch
     from aqualog.model.term import Model
 
-__version__ = "0.51.0"
+__version__ = "0.52.0"
 
 _FACE = {
     "read": "aqualog.face.drive",

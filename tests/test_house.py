@@ -12,7 +12,7 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 97_955
+MOST_LINES = 97_968
 MOST_FILES = 504
 MOST_TEST_LINES = 72_989
 MEDIAN_MODULE = 182

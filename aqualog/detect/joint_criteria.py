@@ -18,18 +18,19 @@ from aqualog.detect.cusum import CusumParams
 from aqualog.detect.detector import Detector, Needs, Output, Scene, Setup, missing_wheels, traction
 from aqualog.detect.events import AFTER
 from aqualog.detect.margin.watch import MARGIN, PROBABLE
-from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN
+from aqualog.detect.minor_spin_down import MINOR_SPIN_DOWN, VAR_MIN
 from aqualog.detect.resistance import LEVEL, MEASURE, RESISTANCE
 from aqualog.detect.slip_slope.watch import SLIP_SLOPE_DROP
 from aqualog.detect.spin import HELD_S, MU_FULL, SLIP_FULL, SPIN_DOWN, spins_round
 from aqualog.detect.spin_up import SPIN_UP
+from aqualog.features.stream import Features
 from aqualog.physics.load import G
 from aqualog.physics.slip import slip_of_wheel_speed
 
 __all__ = [
     "ALONE", "CRITERIA", "FULL", "GATE", "GATED", "GATE_AFTER", "GATE_HOLD", "HOLD", "JOINT_CRITERIA", "MAY_BE_WATER",
-    "ROTATES", "SLOPE", "Criteria", "JointCriteriaWatch", "criteria", "gate_params", "joint_needs", "joint_severity",
-    "without_start",
+    "ROTATES", "SLOPE", "Criteria", "JointCriteriaWatch", "criteria", "gate_params", "is_alone", "joint_needs",
+    "joint_severity", "without_start",
 ]  # fmt: skip
 
 THRESHOLD = 0.03  # [m/s]
@@ -218,9 +219,20 @@ class JointCriteriaWatch:
         bits, self._free[key] = began_free(
             track.active, scene.braking[track.wheel], self._free.get(key, (False, False))
         )
+        if track.detector == MINOR_SPIN_DOWN.name and track.wheel in self._setup.vehicle.driven:
+            # its torque swings it both ways: only a free wheel must fall behind the car (C66)
+            with np.errstate(invalid="ignore"):
+                shakes = track.statistic > VAR_MIN * track.threshold
+            bits = bits | (shakes & is_alone(track, scene.f) & ~scene.braking[track.wheel])
         bits = bits & ~rotates
         # a wheel may spin up on water before the car spins round, and go on where the road is dry
         return bits & ~spins_round(scene.f) if track.detector == SPIN_UP.name else bits
+
+
+def is_alone(track: Track, f: Features) -> BoolArray:
+    """Where the other axle has less than three tenths of the variance of a wheel's acceleration. (n,)"""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(track.statistic > ALONE * f.get(f"variance_{track.wheel}", track.statistic))
 
 
 def joint_needs(vehicle: Vehicle, have: Collection[str], rate_hz: float) -> Needs:

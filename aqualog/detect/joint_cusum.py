@@ -13,7 +13,6 @@ from aqualog.detect.braking import hold_on
 from aqualog.detect.detector import Detector, JointCusumParams, Output, Scene, Setup
 from aqualog.detect.events import AFTER
 from aqualog.detect.joint_criteria import (
-    ALONE,
     FULL,
     GATE,
     GATE_AFTER,
@@ -21,6 +20,7 @@ from aqualog.detect.joint_criteria import (
     JOINT_CRITERIA,
     MAY_BE_WATER,
     ROTATES,
+    is_alone,
     joint_needs,
     joint_severity,
     without_start,
@@ -131,8 +131,7 @@ def _counts(track: Track, scene: Scene) -> BoolArray:
         return np.ones(scene.size, dtype=bool)
     bits: BoolArray = ~scene.braking[track.wheel] & ~scene.shared[ROTATES]
     if track.detector == MINOR_SPIN_DOWN.name:
-        with np.errstate(invalid="ignore"):
-            bits &= track.statistic > ALONE * scene.f.get(f"variance_{track.wheel}", track.statistic)
+        bits &= is_alone(track, scene.f)
     if track.detector == SPIN_UP.name:
         bits &= (track.active & ~spins_round(scene.f)) | has_lost_traction(scene.f, track.wheel)
     return bits

@@ -18,10 +18,12 @@ from aqualog.detect.ewvar import step as ewvar_step
 from aqualog.detect.spin import wheel_evidence
 
 __all__ = [
-    "A_Y_MINOR", "MINOR_SPIN_DOWN", "MIN_RATE", "MinorParams", "MinorState", "MinorWatch", "initial_state", "scan",
+    "A_Y_MINOR", "MINOR_SPIN_DOWN", "MIN_RATE", "VAR_MIN", "MinorParams", "MinorState", "MinorWatch", "initial_state",
+    "scan",
 ]  # fmt: skip
 
 THRESHOLD = 1.0  # [(m/s^2)^2]
+VAR_MIN = 1.2  # of the threshold: the wheel's own variance
 MIN_RATE = 20.0  # [Hz] a minor spin-down lasts 50 to 300 ms; slower wheel speeds show kerbs and noise only
 A_Y_MINOR = 4.0  # [m/s^2] beyond, the inner wheels lose load enough to slow down on dry road too
 
@@ -45,7 +47,7 @@ class MinorParams(NamedTuple):
     def make(dt: float, threshold: float = THRESHOLD) -> MinorParams:
         """Return defaults: 0.5 s of memory, 1.2 (m/s²)² of the wheel, 1.0 of the difference, 8 to 1 below zero."""
         return MinorParams(
-            from_seconds(0.5, 0.5, dt), 1.2 * threshold, threshold, 0.7, 0.5, 8.0, 0.035, 8.0, 0.5, 0.6, dt
+            from_seconds(0.5, 0.5, dt), VAR_MIN * threshold, threshold, 0.7, 0.5, 8.0, 0.035, 8.0, 0.5, 0.6, dt
         )
 
 

@@ -46,9 +46,9 @@ def track(detector, bits, wheel="fr", statistic=None):
     return Track(detector, None if detector == "resistance" else wheel, "right", "-", statistic, 0.5, bits)
 
 
-def watched(detector, seen, settings=None, threshold=None):
+def watched(detector, seen, settings=None, threshold=None, car=CAR):
     """Track, event at the end of the drive (or None), and features of one piece."""
-    setup = Setup(detector, CAR, DT, threshold or detector.threshold, settings or Settings())
+    setup = Setup(detector, car, DT, threshold or detector.threshold, settings or Settings())
     output = detector.start(setup).push(seen)
     ((found, evidence),) = output.found
     book = EventBook(10_000_000)
@@ -103,6 +103,18 @@ def test_a_criterion_that_began_under_braking_does_not_count():
     assert watched(JOINT_CRITERIA, seen)[0].active.any()
     braking = dict.fromkeys(WHEELS, np.arange(N) < 30)
     assert not watched(JOINT_CRITERIA, replace(seen, braking=braking))[0].active.any()
+
+
+@pytest.mark.parametrize(("drivetrain", "variance", "braked", "counts"), [
+    ("awd", 2.2, False, True), ("awd", 4.0, False, False), ("awd", 2.2, True, False), ("rwd", 2.2, False, False),
+])  # fmt: skip
+def test_a_driven_wheel_that_shakes_need_not_fall_behind_the_car(drivetrain, variance, braked, counts):
+    """Its torque swings it both ways; a free wheel that is not behind the car has a bump (C66)."""
+    seen = scene([track("minor_spin_down", False, statistic=2.0)])
+    seen = replace(seen, f=seen.f | {"variance_fr": np.full(N, variance)})
+    seen = replace(seen, braking=dict.fromkeys(WHEELS, ~NOTHING if braked else NOTHING))
+    car = replace(CAR, drivetrain=drivetrain)
+    assert watched(JOINT_CRITERIA, seen, car=car)[0].active.any() == counts
 
 
 ALL = {"spin_up": 1.5, "spin_down": 1.5, "resistance": 0.3, "minor_spin_down": 4.0, "slip_slope_drop": 0.75}
