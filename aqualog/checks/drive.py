@@ -23,6 +23,7 @@ LEAST_SAMPLES = 50  # of the measure
 RESISTANCE = 0.3  # [m/s^2] median over a drive: more than any stretch of dry road makes
 IMPOSSIBLE = 2.5  # [m/s^2] median over a drive: 7 mm of water under all wheels at 100 km/h cost 1.5 (D)
 GAIN_OFF = 0.10  # of the torque gain, or of the mass: more than fuel, load and a driveline's losses
+SPINS = 0.1  # of the speed by which a wheel is faster or slower than the others
 MOVING = 5.0  # [m/s]
 BRAKED = 3e5  # [Pa] from which the detectors take a wheel for braked
 ROLLING = -0.3  # [m/s^2] a car that slows down less is not braked
@@ -116,6 +117,8 @@ def _gain(windows: Windows) -> Iterator[Doubt]:
     pushed = (force - inertia / car.arm("fl") * np.gradient(v, windows.step_s)) / car.mass
     with np.errstate(invalid="ignore"):
         good = (v > MOVING) & (pushed > PUSHED) & np.isfinite(a_x)
+        for wheel in windows.wheels.values():  # the torque of a wheel that spins moves the wheel
+            good &= ~(np.abs(wheel - v) > SPINS * v)
     if "yaw_rate" in windows:
         with np.errstate(invalid="ignore"):
             good &= np.abs(v * windows["yaw_rate"]) < 1.5
@@ -134,6 +137,8 @@ def _gain(windows: Windows) -> Iterator[Doubt]:
     )
     if gain < 0.0:
         advice = "check the sign of the torques in the signal map"
+    elif low < 0.0:
+        advice = "check which wheels the torques of the signal map belong to, and their time"
     else:
         advice = _gain_advice(gain, car, axles)
     yield Doubt("torque", ("torque_gain", "mass"), what, advice, value=gain, ci95=(low, high))

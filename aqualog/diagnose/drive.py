@@ -23,7 +23,7 @@ from aqualog.model.follow import FOLLOW_RATE, Course, follow
 from aqualog.model.scenario import Lane
 from aqualog.model.term import Model, Term
 
-__all__ = ["ON_WATER", "RESERVED", "Drive", "floating", "led_by", "prepare", "rolling_under", "stretches"]
+__all__ = ["ON_WATER", "RESERVED", "Drive", "floating", "led_by", "on_water", "prepare", "rolling_under", "stretches"]
 
 ON_WATER = " s on water "  # in the note on time that is not judged
 LITTLE = 0.5  # share of the time on water that is judged, below which a note says so
@@ -194,11 +194,17 @@ def calm(drive: Drive) -> Drive:
 
 def _judged_on_water(mask: BoolArray, course: Course, dt: float) -> list[str]:
     """A note where most of the water is left out: no effect there is not what the drive shows."""
-    on_water = block_means((_depth(course) > 0.0).astype(np.float64), dt) > 0.0
-    water_s, judged_s = (float(x.sum()) * block_step(dt) for x in (on_water, on_water & mask))
+    water_s, judged_s = on_water(mask, course, dt)
     if judged_s >= LITTLE * water_s:
         return []
     return [f"of {water_s:.0f}{ON_WATER}{judged_s:.0f} s are judged: in the rest a wheel may float"]
+
+
+def on_water(mask: BoolArray, course: Course, dt: float) -> tuple[float, float]:
+    """Time on water, and the part of it that is judged. [s]"""
+    wet = block_means((_depth(course) > 0.0).astype(np.float64), dt) > 0.0
+    water_s, judged_s = (float(x.sum()) * block_step(dt) for x in (wet, wet & mask))
+    return water_s, judged_s
 
 
 def led_by(drive: Drive, model: Model) -> Drive:

@@ -73,8 +73,9 @@ def measured_gain(
     before, after = scores_of(z), scores_of(extended)
     won = log_score_gain(before, after, seed=seed)
     promised = sum(0.5 * float(np.square(a - b).sum()) for a, b in zip(z, extended, strict=True))
+    rest = won.value - max(float((b - a).max()) for a, b in zip(before, after, strict=True))
     notes = scope(names, before, after, won, in_sample=in_sample)
-    return Gain(tuple(channels), *won, () if in_sample else names, in_sample, consequences, notes, promised)
+    return Gain(tuple(channels), *won, () if in_sample else names, in_sample, consequences, notes, promised, rest)
 
 
 def rms_of_both(

@@ -13,7 +13,7 @@ from aqualog.core.notation import AXLES, WHEELS
 from aqualog.core.records import FloatArray
 from aqualog.core.vehicle import Vehicle
 from aqualog.diagnose.channels import channel_values
-from aqualog.diagnose.drive import Drive, led_by, stretches
+from aqualog.diagnose.drive import Drive, led_by, on_water, stretches
 from aqualog.diagnose.records import name_by_place
 from aqualog.diagnose.threads import beside
 from aqualog.diagnose.tolerances import LANE_TOLERANCES, STAND_IN, TOLERANCES
@@ -121,9 +121,10 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
     itself: a load, a wind, a slope."""
     present = frozenset.intersection(*(d.present for d in drives))
     wet = any(d.course.lanes for d in drives)
+    judged = any(on_water(d.mask, d.course, d.dt)[1] > 0.0 for d in drives)
     torque = not any(d.untorqued for d in drives)
     wheels = all(f"omega_{w}" in present for w in WHEELS)
-    has: dict[Need, bool] = {"water depth": wet, "wheel torque": torque, "wheel speeds": wheels}
+    has: dict[Need, bool] = {"water depth": judged, "wheel torque": torque, "wheel speeds": wheels}
     has["a_x or wheel torque"] = torque or "a_x" in present
     driven = [a for a, own in AXLES.items() if {*own} & {*drives[0].vehicle.driving}]
     length, names = max(d.duration_s for d in drives), [d.name for d in drives]
@@ -136,7 +137,8 @@ def hypotheses(drives: Sequence[Drive], model: Model) -> tuple[tuple[Hypothesis,
         is_sought = bool(effect.drive.begins_like) and (len(drives) == 1 or bool(apart))  # see `moments`
         missing = next((need for need in effect.drive.needs if not has[need]), None)
         if missing is not None:
-            untested[effect.name] = f"no {missing} in the log"
+            is_hidden = missing == "water depth" and wet
+            untested[effect.name] = "no time on water is judged" if is_hidden else f"no {missing} in the log"
             continue
         free = tuple(p.name for p in effect.parameters[: effect.drive.count])
         wheels_of = WHEELS if effect.drive.by_wheel else ()

@@ -51,8 +51,14 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
             f"{form[:1].upper()}{form[1:]} explains the log better than {name_of(c.effect, c.where)}."
             for form, c in instead
         ]
+        doubts += [f"the interval of {name_of(c.effect, c.where)} reaches its physical bound." for c in reaching(best)]
         # a member that is too small to be worth naming is not named: its sign says nothing against the others
         return *doubts, *repeats(chosen, found.arena, noises, {(c.key, "".join(c.drives)) for c in best.large})
+
+    def reaching(best: Candidate[Option]) -> list[Cause]:
+        members = best.option.refit.members if best.option.refit else ()
+        of = {(h.key, h.drive): h for h in members}
+        return [c for c in best.large if (h := of.get((c.key, "".join(c.drives)))) and _reaches_bound(c, h)]
 
     def causes_of(o: Option) -> Causes | None:
         if o.refit is not None:
@@ -62,8 +68,10 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
 
     sets = candidates([(o, o.evidence) for o in found.options], causes_of)
     d = decided(sets, lambda group: _at_place(found, group, model), failing)
-    if d.verdict == "cannot_tell" and not d.alternatives and d.best and not _is_gain(found, d.best.option.refit):
-        return Outcome("no_effect", notes=d.notes)
+    if d.verdict == "cannot_tell" and not d.alternatives and d.best:
+        is_all = len(reaching(d.best)) == len(d.best.large)
+        if is_all or not _is_gain(found, d.best.option.refit):
+            return Outcome("no_effect", notes=d.notes)
     beyond = [found.arena.evidence.asked[found.arena.blocks[b].tag] for b in d.best.option.beyond] if d.best else []
     told = "would stand at its physical bound. Something else acts there."
     return d._replace(notes=(*d.notes, *(f"Not named: {name_of(h.effect.name, h.where)} {told}" for h in beyond)))
@@ -74,6 +82,14 @@ def _is_bounded(cause: Cause) -> bool:
     bounds = {p.name: (p.low, p.high) for p in EFFECTS[cause.effect].parameters}
     every = cause.parameters.items()
     return any(e.value in bounds.get(n, ()) or (e.low < e.high and e.value in (e.low, e.high)) for n, e in every)
+
+
+def _reaches_bound(cause: Cause, h: Hypothesis) -> bool:
+    """Whether an interval reaches the physical bound that lies away from no effect: a tyre 1.3 to 2.5 times as stiff,
+    or stiffer still, is none."""
+    each = ((h.parameter(n), e) for n, e in cause.parameters.items() if n in h.free)
+    ends = ((p.neutral, p.high, e.high) if e.value > p.neutral else (p.neutral, p.low, e.low) for p, e in each)
+    return any(far == end != neutral for neutral, far, end in ends)
 
 
 def _is_absent(cause: Cause) -> bool:

@@ -22,7 +22,7 @@ from aqualog.diagnose.drive import ON_WATER, Drive, calm, floating, led_by, prep
 from aqualog.diagnose.evidence import SURROGATES, Evidence, around_water, recentred, tolerant
 from aqualog.diagnose.faster import Late, faster, found_late, joined, with_rings
 from aqualog.diagnose.file_values import in_words, not_calibrated, with_known
-from aqualog.diagnose.gain import measured_gain
+from aqualog.diagnose.gain import BLOCK_S, measured_gain
 from aqualog.diagnose.grade import HILLY, Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
 from aqualog.diagnose.isolate import supported
@@ -88,7 +88,11 @@ def diagnose(
         left = found_late([s for _, s in drives], vehicle, with_known(given, vehicle), least=LEAST_LATE_S)
     if found.verdict == "not_testable" or not left.causes:
         return found
-    return _diagnosed(drives, vehicle, given, holdout, options, tell, left)
+    shifted = _diagnosed(drives, vehicle, given, holdout, options, tell, left)
+    if shifted.gain is None or shifted.gain.log_score > 0.0:
+        return shifted
+    said = " ".join(c.sentence for c in left.causes)
+    return replace(found, notes=(*found.notes, f"Not named: {said} The drives are predicted worse with it."))
 
 
 def _diagnosed(
@@ -150,6 +154,8 @@ def _diagnosed(
     done = beside(lambda f: f(), last)
     gained, next_run = done[0] if differs else None, done[-1] if is_unclear else None
     outcome = _by_gain(outcome, gained, frozenset(c.effect for c in (*seen.causes, *late.causes)))
+    if outcome.verdict == "no_effect":
+        extended, settled, after, gained, next_run = bare, bare, before, None, None
     p, reason = found.significance.p_value, f" ({short_form(forms[0])})" if forms else ""
     sentence = by_drives(found.arena.parts, len(drives)) + verdict_sentence(
         outcome.verdict, outcome.causes, level=options.level, reason=reason, certain=outcome.certain,
@@ -303,8 +309,16 @@ def _at_likeliest(
 
 def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str]) -> Outcome[Option]:
     """The outcome, without a name where the drives gain too little of what it promises them; of held-out drives only a
-    name of car or tyre: others may be the diagnosed drive's alone. `rings` are certain without other drives."""
-    if gained is None or gained.log_score > KEPT * gained.promised:
+    name of car or tyre: others may be the diagnosed drive's alone. `rings` are certain without other drives. Where one
+    block alone gains, and the rest of the drive loses, nothing is left of the answer."""
+    if gained is None or outcome.verdict in ("unexplained", "no_effect"):
+        return outcome
+    least, alone = KEPT * gained.promised, gained.log_score - gained.rest
+    if gained.in_sample and gained.rest < -least and alone > least and not outcome.certain & rings:
+        said = " ".join(c.sentence for c in outcome.causes)
+        against = f"Not named: {said} Only {BLOCK_S:g} s speak for it, and the rest of the drive against it."
+        return Outcome("no_effect", notes=(*outcome.notes, against))
+    if gained.log_score > least:
         return outcome
     belong = {EFFECTS[c.effect].belongs for c in outcome.causes if not c.drives}
     stays = gained.in_sample or (bool(belong) and belong <= {"car", "tyre"})

@@ -41,6 +41,23 @@ def test_water_that_the_driver_pushes_against_is_no_gain():
     assert [r for r in look(signals(wet), CAR) if r.kind == "torque"] == []
 
 
+def test_torque_on_wheels_that_spin_is_no_gain():
+    """Torque for 3 m/s² on rear wheels that turn by a third faster than the car, 20 s of each minute."""
+    t = 0.05 * np.arange(DRIVE["v_x"].size)
+    spins = t % 60.0 < 20.0
+    more = {
+        n: DRIVE[n] + np.where(spins, 3.0 * CAR.mass * CAR.arm("rl") / 2.0, 0.0) * np.sin(2.0 * t) ** 2 for n in TORQUES
+    }
+    more |= {f"omega_r{s}": DRIVE[f"omega_r{s}"] * np.where(spins, 1.33, 1.0) for s in "lr"}
+    assert [r for r in look(signals({**DRIVE, **more}), CAR) if r.kind == "torque"] == []
+
+
+def test_a_gain_that_may_be_none_is_no_value_for_the_file(monkeypatch):
+    monkeypatch.setattr("aqualog.checks.drive._slope", lambda *_: (0.25, 0.39))
+    (remark,) = (r for r in said() if r.kind == "torque")
+    assert remark.advice == "check which wheels the torques of the signal map belong to, and their time"
+
+
 def test_a_gain_of_the_file_is_multiplied():
     (remark,) = said(replace(CAR, torque_gain=0.5), **dict.fromkeys(TORQUES, 1.25))
     assert f"torque_gain = {0.5 * remark.value:.3g}" in remark.advice

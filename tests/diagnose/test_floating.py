@@ -7,9 +7,11 @@ import numpy as np
 
 from aqualog.diagnose.channels import centre_line_speeds
 from aqualog.diagnose.drive import BEYOND_GRIP, prepare
+from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.diagnose.inputs import brakes_unlogged
 from aqualog.model.scenario import Lane
 from aqualog.model.sensors import IDEAL
+from aqualog.model.term import Model
 from tests.diagnose.test_drive import CAR, changed, signals
 
 SPEED = ((0.0, 22.0), (28.0, 22.0), (32.0, 34.0), (44.0, 34.0), (52.0, 20.0))
@@ -58,5 +60,9 @@ def test_water_that_is_hardly_judged_is_said():
     deep = tuple(replace(x, depth_left=4e-3, depth_right=4e-3) for x in LANES)
     (note,) = (n for n in prepare(wet(lanes=deep), CAR, "a").notes if "on water" in n)
     assert note.startswith("of 24 s on water 0 s are judged")
+    asked, untested = hypotheses([prepare(wet(lanes=deep), CAR, "a")], Model())
+    assert untested["contact_loss"] == untested["water_drag"] == "no time on water is judged"
+    assert not {"contact_loss", "water_drag"} & {h.effect.name for h in asked}
     shallow = tuple(replace(x, depth_left=3e-4, depth_right=3e-4) for x in LANES)
     assert not any("on water" in n for n in prepare(wet(lanes=shallow), CAR, "a").notes)
+    assert "contact_loss" not in hypotheses([prepare(wet(lanes=shallow), CAR, "a")], Model())[1]

@@ -6,8 +6,18 @@ import numpy as np
 import pytest
 
 from aqualog.core.errors import FitError
-from aqualog.diagnose import gain
+from aqualog.diagnose import gain, run
+from aqualog.diagnose.channels import contrasts
+from aqualog.diagnose.drive import prepare
 from aqualog.diagnose.gain import BLOCK_S, block_scores, log_score_gain, rms_of_both, scope
+from aqualog.diagnose.hypotheses import residual
+from aqualog.diagnose.noise import fit_noise
+from aqualog.diagnose.records import Gain
+from aqualog.diagnose.verdict import Outcome
+from aqualog.model.term import Model
+from tests.diagnose.test_drive import CAR
+from tests.diagnose.test_run import noisy
+from tests.diagnose.test_verdict import cause
 
 RNG = np.random.default_rng(11)
 
@@ -126,3 +136,28 @@ def test_in_sample_is_told():
 
 def test_many_drives_are_units():
     assert notes(drives=6)[1] == ("the interval of the log score holds for 6 other drives of this kind",)
+
+
+@pytest.mark.parametrize(("rest", "in_sample", "certain", "left"), [
+    (-60.0, True, False, "no_effect"), (-5.0, True, False, "named"), (60.0, True, False, "named"),
+    (-60.0, False, False, "named"), (-60.0, True, True, "named"),
+])  # fmt: skip
+def test_an_answer_that_one_block_alone_speaks_for_is_none(rest, in_sample, certain, left):
+    """A burst of noise fits a delay in 20 s, and the rest of the drive is predicted worse with it."""
+    own, _ = cause("payload_mass")
+    found = Gain((), 30.0, 1.0, 60.0, () if in_sample else ("b",), in_sample, promised=100.0, rest=rest)
+    named = Outcome("named", (own,), certain=frozenset({"payload_mass"}))
+    after = run._by_gain(named, found, frozenset({"payload_mass"} if certain else ()))
+    assert after.verdict == left
+    assert after.causes == (() if left == "no_effect" else (own,))
+    assert bool(after.notes) == (left == "no_effect")
+
+
+def test_rest_is_the_gain_without_the_best_block(monkeypatch):
+    """Of three blocks, of which one gains."""
+    drive = prepare(noisy(duration_s=60.0), CAR, "a")
+    noise = fit_noise(residual(drive, Model()), drive.mask, contrasts(drive.channels))
+    scores = iter((np.zeros(3), np.array([5.0, -1.0, -2.0])))
+    monkeypatch.setattr(gain, "block_scores", lambda *_: next(scores))
+    found = gain.measured_gain([drive], (Model(), Model(), Model()), noise, seed=1, in_sample=True)
+    assert (found.log_score, found.rest) == (2.0, -3.0)

@@ -3,8 +3,9 @@
 import pytest
 
 from aqualog.checks.doubts import Doubt
+from aqualog.diagnose import run
 from aqualog.diagnose.drive import prepare
-from aqualog.diagnose.faster import found_late
+from aqualog.diagnose.faster import Late, found_late
 from aqualog.diagnose.hypotheses import hypotheses
 from aqualog.model.effects import EFFECTS
 from aqualog.model.term import Model, Term
@@ -88,6 +89,16 @@ def test_a_drive_whose_delay_the_competition_does_not_find(monkeypatch, mass):
     slip = next(c for c in found.gain.channels if c.channel == "slip_fl")
     assert slip.rmse_after < 0.2 * slip.rmse_before
     assert found.gain.log_score > 100.0
+
+
+def test_a_delay_with_which_the_drive_is_predicted_worse_is_no_name(monkeypatch):
+    """Noise that goes with itself has a lag as well; it is seen in curves and braking, where the model does not look."""
+    lag = late("v_x").causes
+    monkeypatch.setattr(run, "found_late", lambda *_, **__: Late(lag))
+    d = told()
+    assert (d.verdict, d.causes) == ("no_effect", ())
+    assert d.notes[-1].startswith(f"Not named: {lag[0].sentence}")
+    assert d.notes[-1].endswith("predicted worse with it.")
 
 
 def test_a_delay_that_the_competition_finds_keeps_its_interval():

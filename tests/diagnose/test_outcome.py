@@ -102,8 +102,19 @@ def test_a_name_that_a_form_outshines_is_not_certain():
     assert with_form("aero_drag").verdict == "named"
 
 
-def test_an_interval_ends_at_the_physical_bound():
-    assert told(option(road_grade=0.19)).causes[0].parameters["grade"].high == 0.2
+def test_an_interval_that_reaches_the_physical_bound_is_no_name():
+    """Up to 20 % of slope, or more: something else acts there. A bound that means no effect is none of that kind."""
+    rivals = told(option(road_grade=0.19), option(SURE - 0.7, payload_mass=200.0))
+    assert rivals.causes[0].parameters["grade"].high == 0.2
+    assert rivals.verdict == "cannot_tell"
+    alone = told(option(road_grade=0.19))
+    assert (alone.verdict, alone.causes) == ("no_effect", ())
+    assert alone.notes == ("Not named: the interval of road grade reaches its physical bound.",)
+    assert told(option(road_grade=0.16)).verdict == "named"
+    (payload,) = told(option(payload_mass=200.0)).causes
+    h = next(h for h in ASKED if h.key == "payload_mass")
+    own = payload.parameters["delta_mass"]
+    assert not outcome._reaches_bound(replace(payload, parameters={"delta_mass": replace(own, low=own.value / 2.0)}), h)
 
 
 def test_a_trailer_of_no_mass_is_drag_alone(monkeypatch):
