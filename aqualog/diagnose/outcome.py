@@ -27,6 +27,7 @@ from aqualog.model.term import Model
 
 __all__ = ["agreements", "conclude", "contradicted", "widened", "with_causes"]
 
+NEAR_NONE = 1.0 - Z95 / 3.0  # of a value, at which its interval begins where it is three standard deviations
 EXPLAINS = 0.03  # relative fall of a channel's rms from which on an effect explains it
 
 
@@ -51,14 +52,17 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
             f"{form[:1].upper()}{form[1:]} explains the log better than {name_of(c.effect, c.where)}."
             for form, c in instead
         ]
-        doubts += [f"the interval of {name_of(c.effect, c.where)} reaches its physical bound." for c in reaching(best)]
+        doubts += [
+            f"the interval of {name_of(c.effect, c.where)} reaches its physical bound." for c, _ in reaching(best)
+        ]
         # a member that is too small to be worth naming is not named: its sign says nothing against the others
         return *doubts, *repeats(chosen, found.arena, noises, {(c.key, "".join(c.drives)) for c in best.large})
 
-    def reaching(best: Candidate[Option]) -> list[Cause]:
+    def reaching(best: Candidate[Option]) -> list[tuple[Cause, Hypothesis]]:
         members = best.option.refit.members if best.option.refit else ()
         of = {(h.key, h.drive): h for h in members}
-        return [c for c in best.large if (h := of.get((c.key, "".join(c.drives)))) and _reaches_bound(c, h)]
+        each = ((c, of.get((c.key, "".join(c.drives)))) for c in best.large)
+        return [(c, h) for c, h in each if h is not None and _reaches_bound(c, h)]
 
     def causes_of(o: Option) -> Causes | None:
         if o.refit is not None:
@@ -69,7 +73,7 @@ def conclude(found: Found, model: Model) -> Outcome[Option]:
     sets = candidates([(o, o.evidence) for o in found.options], causes_of)
     d = decided(sets, lambda group: _at_place(found, group, model), failing)
     if d.verdict == "cannot_tell" and not d.alternatives and d.best:
-        is_all = len(reaching(d.best)) == len(d.best.large)
+        is_all = sum(_is_any_size(c, h) for c, h in reaching(d.best)) == len(d.best.large)
         if is_all or not _is_gain(found, d.best.option.refit):
             return Outcome("no_effect", notes=d.notes)
     beyond = [found.arena.evidence.asked[found.arena.blocks[b].tag] for b in d.best.option.beyond] if d.best else []
@@ -85,11 +89,16 @@ def _is_bounded(cause: Cause) -> bool:
 
 
 def _reaches_bound(cause: Cause, h: Hypothesis) -> bool:
-    """Whether an interval reaches the physical bound that lies away from no effect: a tyre 1.3 to 2.5 times as stiff,
-    or stiffer still, is none."""
+    """Whether an interval reaches the physical bound that lies away from no effect."""
     each = ((h.parameter(n), e) for n, e in cause.parameters.items() if n in h.free)
     ends = ((p.neutral, p.high, e.high) if e.value > p.neutral else (p.neutral, p.low, e.low) for p, e in each)
     return any(far == end != neutral for neutral, far, end in ends)
+
+
+def _is_any_size(cause: Cause, h: Hypothesis) -> bool:
+    """Whether intervals begin so near to no effect that the size is unknown: tyres 1.3 to 2.5 times as stiff."""
+    each = ((h.parameter(n).neutral, e) for n, e in cause.parameters.items() if n in h.free)
+    return all(min(abs(e.low - x), abs(e.high - x)) < NEAR_NONE * abs(e.value - x) for x, e in each)
 
 
 def _is_absent(cause: Cause) -> bool:

@@ -108,9 +108,12 @@ def test_an_interval_that_reaches_the_physical_bound_is_no_name():
     assert rivals.causes[0].parameters["grade"].high == 0.2
     assert rivals.verdict == "cannot_tell"
     alone = told(option(road_grade=0.19))
-    assert (alone.verdict, alone.causes) == ("no_effect", ())
+    assert (alone.verdict, alone.causes[0].probability) == ("cannot_tell", 0.9)
     assert alone.notes == ("Not named: the interval of road grade reaches its physical bound.",)
     assert told(option(road_grade=0.16)).verdict == "named"
+    wide = option(road_grade=0.16)
+    wide = replace(wide, refit=replace(wide.refit, covariance=np.diag([0.054**2])))
+    assert (told(wide).verdict, told(wide).causes) == ("no_effect", ())  # 5 to 20 %, or more
     (payload,) = told(option(payload_mass=200.0)).causes
     h = next(h for h in ASKED if h.key == "payload_mass")
     own = payload.parameters["delta_mass"]
