@@ -218,8 +218,8 @@ class Consequence:
 class Gain:
     """Gain of the extended model. `log_score` on the drives `heldout` with its 95 % interval; without these on the
     diagnosed ones (`in_sample`). `promised`: what the effects would gain there on average if they and their values were
-    right, NaN where it was not computed; `rest`: the gain without the block of 20 s that gains most. [nats (natural
-    logarithm)]"""
+    right, NaN where it was not computed. [nats (natural logarithm)] `is_burst`: of the diagnosed drives one block alone
+    gains, and the rest loses."""
 
     channels: tuple[ChannelGain, ...]
     log_score: float
@@ -230,7 +230,7 @@ class Gain:
     consequences: tuple[Consequence, ...] = ()
     notes: tuple[str, ...] = ()
     promised: float = math.nan
-    rest: float = math.nan
+    is_burst: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ from aqualog.diagnose.drive import ON_WATER, Drive, calm, floating, led_by, prep
 from aqualog.diagnose.evidence import SURROGATES, Evidence, around_water, recentred, tolerant
 from aqualog.diagnose.faster import Late, faster, found_late, joined, with_rings
 from aqualog.diagnose.file_values import in_words, not_calibrated, with_known
-from aqualog.diagnose.gain import BLOCK_S, measured_gain
+from aqualog.diagnose.gain import BLOCK_S, KEPT, gains_by_burst, measured_gain
 from aqualog.diagnose.grade import HILLY, Profile, find_profile, with_profile
 from aqualog.diagnose.hypotheses import Hypothesis, hypotheses, residual
 from aqualog.diagnose.isolate import supported
@@ -48,9 +48,6 @@ LEAST_GAIN, MOST_GAIN = 0.5, 1.5  # bounds of an accelerometer's gain
 LEAST_MOTION = 0.1  # [m/s^2] sd of the change of the acceleration
 _WET = "Laws of water differ by that much; `aqualog calibrate --wet` fits one to the car's own passes."
 _SHARED = "The extended model has what all drives share, not what some have alone."
-# least share of the promised gain that held-out drives keep, which is 0 for an effect of half the size: 58 right names
-# kept 0.13 to 1.8 of it, two wrong ones beside measured noise -0.3 and 0.0 (S)
-KEPT = 0.1
 _MOVES = {"v_x": ("v_x",), "wheel speeds": [f"omega_{w}" for w in WHEELS], "a_x": ("a_x",)}
 LEAST_LATE_S = 0.1  # [s] asked about where more than noise is left
 SAME = 0.2  # of what a signal changes by from sample to sample, a difference that is rounding
@@ -289,7 +286,8 @@ def _gained(
         )  # fmt: skip
 
     try:
-        return measured(models)
+        found = measured(models)
+        return replace(found, is_burst=gains_by_burst(ready, models, noise)) if unseen else found
     except ConfigError:  # no car drives there with its likeliest values together
         return measured((models[0], models[0], extended))
 
@@ -313,12 +311,11 @@ def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str
     block alone gains, and the rest of the drive loses, nothing is left of the answer."""
     if gained is None or outcome.verdict in ("unexplained", "no_effect"):
         return outcome
-    least, alone = KEPT * gained.promised, gained.log_score - gained.rest
-    if gained.in_sample and gained.rest < -least and alone > least and not outcome.certain & rings:
+    if gained.is_burst and not outcome.certain & rings:
         said = " ".join(c.sentence for c in outcome.causes)
         against = f"Not named: {said} Only {BLOCK_S:g} s speak for it, and the rest of the drive against it."
         return Outcome("no_effect", notes=(*outcome.notes, against))
-    if gained.log_score > least:
+    if gained.log_score > KEPT * gained.promised:
         return outcome
     belong = {EFFECTS[c.effect].belongs for c in outcome.causes if not c.drives}
     stays = gained.in_sample or (bool(belong) and belong <= {"car", "tyre"})

@@ -6,17 +6,13 @@ import numpy as np
 import pytest
 
 from aqualog.core.errors import FitError
-from aqualog.diagnose import gain, run
-from aqualog.diagnose.channels import contrasts
-from aqualog.diagnose.drive import prepare
+from aqualog.diagnose import arena, gain, run
 from aqualog.diagnose.gain import BLOCK_S, block_scores, log_score_gain, rms_of_both, scope
-from aqualog.diagnose.hypotheses import residual
-from aqualog.diagnose.noise import fit_noise
 from aqualog.diagnose.records import Gain
 from aqualog.diagnose.verdict import Outcome
 from aqualog.model.term import Model
-from tests.diagnose.test_drive import CAR
-from tests.diagnose.test_run import noisy
+from tests.diagnose.test_drive import CAR, term
+from tests.diagnose.test_run import FEW, QUICK, ask, noisy
 from tests.diagnose.test_verdict import cause
 
 RNG = np.random.default_rng(11)
@@ -138,14 +134,14 @@ def test_many_drives_are_units():
     assert notes(drives=6)[1] == ("the interval of the log score holds for 6 other drives of this kind",)
 
 
-@pytest.mark.parametrize(("rest", "in_sample", "certain", "left"), [
-    (-60.0, True, False, "no_effect"), (-5.0, True, False, "named"), (60.0, True, False, "named"),
-    (-60.0, False, False, "named"), (-60.0, True, True, "named"),
+@pytest.mark.parametrize(("is_burst", "in_sample", "certain", "left"), [
+    (True, True, False, "no_effect"), (True, False, False, "no_effect"), (False, True, False, "named"),
+    (True, True, True, "named"),
 ])  # fmt: skip
-def test_an_answer_that_one_block_alone_speaks_for_is_none(rest, in_sample, certain, left):
+def test_an_answer_that_one_block_alone_speaks_for_is_none(is_burst, in_sample, certain, left):
     """A burst of noise fits a delay in 20 s, and the rest of the drive is predicted worse with it."""
     own, _ = cause("payload_mass")
-    found = Gain((), 30.0, 1.0, 60.0, () if in_sample else ("b",), in_sample, promised=100.0, rest=rest)
+    found = Gain((), 30.0, 1.0, 60.0, () if in_sample else ("b",), in_sample, promised=100.0, is_burst=is_burst)
     named = Outcome("named", (own,), certain=frozenset({"payload_mass"}))
     after = run._by_gain(named, found, frozenset({"payload_mass"} if certain else ()))
     assert after.verdict == left
@@ -153,11 +149,25 @@ def test_an_answer_that_one_block_alone_speaks_for_is_none(rest, in_sample, cert
     assert bool(after.notes) == (left == "no_effect")
 
 
-def test_rest_is_the_gain_without_the_best_block(monkeypatch):
-    """Of three blocks, of which one gains."""
-    drive = prepare(noisy(duration_s=60.0), CAR, "a")
-    noise = fit_noise(residual(drive, Model()), drive.mask, contrasts(drive.channels))
-    scores = iter((np.zeros(3), np.array([5.0, -1.0, -2.0])))
-    monkeypatch.setattr(gain, "block_scores", lambda *_: next(scores))
-    found = gain.measured_gain([drive], (Model(), Model(), Model()), noise, seed=1, in_sample=True)
-    assert (found.log_score, found.rest) == (2.0, -3.0)
+@pytest.mark.parametrize(("gains", "burst"), [
+    ([97.0, 8.0, -23.0, -52.0], True), ([97.0, 8.0, -3.0, 1.0], False), ([97.0, -3.0, -4.0], False), ([-5.0, -30.0, -40.0], False),
+    ([40.0, 30.0, 20.0], False), ([50.0], False),
+])  # fmt: skip
+def test_one_block_alone_gains_and_the_rest_loses(gains, burst, monkeypatch):
+    """More than a tenth of the 100 that are promised, on both sides; of a single block there is no rest."""
+    compared = gain._Compared([], [], [np.zeros(len(gains))], [np.array(gains)], 100.0)
+    monkeypatch.setattr(gain, "_compared", lambda *_: compared)
+    assert gain.gains_by_burst((), (Model(),) * 3, None) == burst
+
+
+@pytest.mark.parametrize("holdout", [False, True])
+def test_a_burst_is_sought_in_the_diagnosed_drive(holdout, monkeypatch):
+    """Where others are held out as well."""
+    ask(monkeypatch, FEW)
+    monkeypatch.setattr(arena, "shapes", lambda *_: ())
+    monkeypatch.setattr(gain, "_is_burst", lambda before, *_: len(before[0]) == 4)  # blocks of the diagnosed drive
+    others = [("b", noisy(term("payload_mass", delta_mass=250.0), seed=9, duration_s=60.0))] if holdout else []
+    log = noisy(term("payload_mass", delta_mass=250.0), seed=3)
+    d = run.diagnose([("a", log)], CAR, holdout=others, options=QUICK)
+    assert d.verdict == "no_effect"
+    assert any("speak for it" in n for n in d.notes)

@@ -4,7 +4,7 @@ What is noise in a measured signal is what a second signal or its own neighbourh
 
 | signal | less | window |
 |---|---|---|
-| accelerometer | derivative of the velocity (a parabola over 0.7 s) | mean over 4 s taken off |
+| accelerometer, without its lag | derivative of the velocity (a parabola over 0.7 s) | mean over 4 s taken off |
 | wheel speed | the wheels' mean, yaw rate, accelerations (least squares) | 4 s |
 | velocity | the wheels' mean; without wheels its own mean over 0.7 s | 4 s |
 | torque, yaw rate, steering | own mean over 0.7 s | 4 s |
@@ -13,7 +13,8 @@ What is noise in a measured signal is what a second signal or its own neighbourh
 Samples beyond six robust standard deviations, such as steps of the pedal, are cut to them. What is slower than four seconds
 (slopes of the road, drifts) stays out, since in a null it would be an effect; so does hard driving (2 m/s² and more). The signals of a source come from the same
 moment, so noise that they share is kept. Torque alone is of another one: what a pedal does within 0.7 s is motion. The accelerometer
-shows it, but the wheels, whose mean is taken off, do not, as if their forces built up slowly. A piece that is too short goes on backwards; between samples runs a line, so that a
+shows it, but the wheels, whose mean is taken off, do not, as if their forces built up slowly. An accelerometer that comes late would leave its delay times the jerk, together with the jerk in the other
+signals: a delay that is there, and no noise. So the derivative is taken as late as the accelerometer follows it best. A piece that is too short goes on backwards; between samples runs a line, so that a
 10 Hz source has no noise above 5 Hz.
 """
 
@@ -35,6 +36,7 @@ __all__ = ["SOURCES", "Noise", "added", "noise_of", "noise_source"]
 SOURCES = tuple(TRIPS)
 _OTHERS = {"bmw": ("porsche", "rav4"), "porsche": ("rav4", "bmw"), "rav4": ("porsche", "bmw")}
 _LONG_S, _SHORT_S, _PIECE_S, _V_LEAST, _CALM, _MOST = 4.0, 0.7, 2.0, 5.0, 2.0, 6.0
+_LATEST_S, _ALIKE = 0.5, 0.5
 _LIKE = {"torque_fl": "torque_f", "torque_fr": "torque_f", "torque_rl": "torque_r", "torque_rr": "torque_r"}
 
 
@@ -56,7 +58,8 @@ def noise_of(drive: Drive) -> Noise:
     motion = [c[n] for n in ("yaw_rate", "a_x", "a_y") if n in c]
     for name, x in c.items():
         if name == "a_x":
-            rest = x - _derivative(c["v_x"] if mean is None else mean * drive.vehicle.r_e("fl"), dt)
+            slope = _derivative(c["v_x"] if mean is None else mean * drive.vehicle.r_e("fl"), dt)
+            rest = x - _as_late(slope, x, calm, dt)
         elif name.startswith("omega_") and mean is not None:
             rest = _unexplained(x, [mean, *motion])
         elif name == "v_x" and mean is not None:
@@ -67,6 +70,15 @@ def noise_of(drive: Drive) -> Noise:
             rest = x - _mean(x, _SHORT_S, dt)
         out[name] = _cut((rest - _mean(rest, _LONG_S, dt))[calm])
     return Noise(drive.car, dt, out)
+
+
+def _as_late(x: FloatArray, as_x: FloatArray, calm: NDArray[np.bool_], dt: float) -> FloatArray:
+    """A smooth signal with the lag, up to half a second, at which another one follows it; as it is where none does."""
+    at, other = np.arange(x.size), (as_x - _mean(as_x, _LONG_S, dt))[calm]
+    shifted = [np.interp(at - lag / dt, at, x) for lag in np.arange(-_LATEST_S, _LATEST_S + 0.005, 0.01)]
+    likes = [float(np.corrcoef((s - _mean(s, _LONG_S, dt))[calm], other)[0, 1]) for s in shifted]
+    best = int(np.argmax(likes))
+    return shifted[best] if likes[best] > _ALIKE else x
 
 
 def _calm(drive: Drive, c: Mapping[str, FloatArray]) -> NDArray[np.bool_]:

@@ -239,6 +239,19 @@ def test_noise_of_a_drive_is_what_its_other_signals_do_not_show(drive):
         assert 0.6 * size < np.std(found.columns[name]) < 1.3 * size
 
 
+def test_an_accelerometer_that_comes_late_leaves_no_jerk_in_the_noise(drive):
+    """What it lags by is a delay that is there, and would be named in drives without an effect."""
+    rng = np.random.default_rng(4)
+    t = drive.columns["t"]
+    v = 18.0 + np.sin(t)
+    a, jerk = (np.cos(t - lag) for lag in (0.2, 0.2 - np.pi / 2.0))
+    hiss = 0.05 * rng.standard_normal(t.size)
+    late = {**drive.columns, "v_x": v, "a_x": a + hiss, **{f"omega_{w}": v / 0.31 for w in WHEELS}}
+    found = noise_of(Drive("test", "made", late, CAR, HERE / "rav4.toml")).columns["a_x"]
+    assert found.std() == pytest.approx(0.05, rel=0.1)
+    assert abs(np.corrcoef(found, jerk[: found.size])[0, 1]) < 0.1
+
+
 def test_nothing_of_the_librarys_physics_or_model_is_used():
     for path in HERE.glob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
