@@ -308,7 +308,7 @@ def _at_likeliest(
 def _by_gain(outcome: Outcome[Option], gained: Gain | None, rings: frozenset[str]) -> Outcome[Option]:
     """The outcome, without a name where the drives gain too little of what it promises them; of held-out drives only a
     name of car or tyre: others may be the diagnosed drive's alone. `rings` are certain without other drives. Where one
-    block alone gains, and the rest of the drive loses, nothing is left of the answer."""
+    block alone gains, and the rest of the drive loses, there is no answer."""
     if gained is None or outcome.verdict in ("unexplained", "no_effect"):
         return outcome
     if gained.is_burst and not outcome.certain & rings:
