@@ -35,9 +35,9 @@ def straight(
     """Straight aquaplaning: the speed at which the wet driven wheel turns 15 % faster than the dry one.
 
     One side of the car runs in water, the other one is dry, with full throttle in a fixed gear. Each run is valid, or
-    says why not. A run that does not reach 15 % counts as above its highest speed. Each set has mean, interval and CV;
-    with --control the index of the others, from which the control's drift by run order is taken out. Beside 15 % stand
-    other signs of lost contact: 5 %, first minor spin-down, drop of the slip slope.
+    says why not. A run that does not reach 15 % counts as above the highest speed at which that could have lasted. Each
+    set has mean, interval and CV; with --control the index of the others, from which the control's drift by run order
+    is taken out. Beside 15 % stand other signs of lost contact: 5 %, first minor spin-down, drop of the slip slope.
 
     \b
     Examples:

@@ -1,7 +1,7 @@
 """Tyres on dry and wet road: parameters as data, each with its unit and where it comes from.
 
 `V` read in the source named, `D` derived, `K` general knowledge, `A` the anchor: worn summer tyre, low pressure,
-1.3 mm, full aquaplaning near 118 km/h. `v_anchor` alone was fitted, and to the anchor alone.
+1.3 mm, full aquaplaning near 118 km/h. What is fitted says so; `water_numbers` has intervals.
 """
 
 from __future__ import annotations
@@ -46,10 +46,13 @@ class Tyre:
         "m", 0.07, 0.02, 0.3, "half contact length at 4 kN and 2.2 bar",
         "QRA1, QRA2 (V, [besselink2010]): 0.066-0.074 (D)",
     )  # fmt: skip
-    width: float = _of("m", 0.205, 0.05, 0.6, "width of the contact", "205/55R16; its tread is 0.82 of that (K)")
+    width: float = _of(
+        "m", 0.205, 0.05, 0.6, "section width, taken for the width of the contact",
+        "205/55R16; its tread is 0.82 of that (K)",
+    )  # fmt: skip
     v_anchor: float = _of(
         "m/s", 120.5 / 3.6, 5.0, 100.0, "full aquaplaning of an even contact at 1.3 mm, 1.9 bar, 4 kN, 1.6 mm of tread",
-        "A: fluctuating and turning slower, 3 of 4 front wheels stop within 0.5 s at 118 km/h",
+        "A: of a fluctuating contact 3 of 4 front wheels turn half as fast within 0.5 s at 118 km/h",
     )  # fmt: skip
     pressure_exponent: float = _of(
         "-", 0.3, 0.0, 1.0, "m of v_full ~ p^m", "fitted; 0.5 - k / 2 by [horne1963], 0.3 [gallaway1979] (K)"
@@ -70,7 +73,7 @@ class Tyre:
     contact_exponent: float = _of("-", 3.5, 1.0, 12.0, "n of L = 1 - (v / v_full)^n", "fitted")
     wedge_arm: float = _of(
         "-", 0.45, 0.0, 1.5, "shift of the load at full aquaplaning over the half length",
-        "34 mm: what it takes from a rolling wheel is about the momentum of the water (D)",
+        "34 mm: from a rolling wheel it takes 0.6 to 2.3 times the momentum of the water where that floats (D)",
     )  # fmt: skip
     h_film: float = _of(
         "m", 0.5e-3, 0.0, 0.01, "film that the tread throws",

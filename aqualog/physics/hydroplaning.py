@@ -34,7 +34,7 @@ SPIN_UP_RATIO = 7.7 / 9.0  # spin-up over spin-down speed: a wheel that has stop
 def horne_speed(p: FloatArray) -> FloatArray:
     """Spin-down speed of a rotating wheel on a flooded road, v = 9 sqrt(p) kn with p in psi. [m/s]
 
-    `p` gauge pressure, > 0 [Pa]. 180, 200, 220, 240 kPa give 85, 90, 94, 99 km/h. Valid for flooded roads, water
+    `p` gauge pressure, > 0 [Pa]. 180, 200, 220, 240 kPa give 85, 90, 94, 98 km/h. Valid for flooded roads, water
     deeper than the grooves, and tyres of aircraft. By the aspect of the contact, width over length, it is 7.95
     sqrt(p / FAR) mph: the same at 0.59. A longer contact floats later.
 

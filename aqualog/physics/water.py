@@ -148,8 +148,9 @@ def residual_film(h_w: FloatArray, L_front: FloatArray, *, h_track: float) -> Fl
         k + (h - k) (1 - L)^6 with k = h_track (1 - exp(-h / h_track)). [m]
 
     A wheel squeezes out a share that grows with the depth: much of 2 mm, little of 0.2 mm, which lies in texture and
-    grooves. As long as it keeps some contact, the film depends little on the depth (thesis 2.3 on Fig. 2.17). A wheel
-    that floats clears nothing; the sixth power makes the passage, over the last third of the contact, smooth. Limits:
+    grooves. As long as it keeps half of its contact, the film depends little on the depth (thesis 2.3 on Fig. 2.17). A
+    wheel that floats clears nothing; the sixth power makes the passage, over the last third of the contact, smooth.
+    Limits:
     L = 0 leaves h; L = 1 leaves h of a thin film, and h_track of deep water.
 
     Source: an assumption in shape, after Fig. 2.17 of [fichtinger2024] (C50).
