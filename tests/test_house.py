@@ -12,9 +12,9 @@ from tests.conftest import LONG
 PACKAGE = Path(aqualog.__file__).parent
 TESTS = Path(__file__).parent
 
-MOST_LINES = 98_066
+MOST_LINES = 98_059
 MOST_FILES = 504
-MOST_TEST_LINES = 73_132
+MOST_TEST_LINES = 73_129
 MEDIAN_MODULE = 182
 LONGEST_MODULE = 500
 LONGEST_FUNCTION = 100

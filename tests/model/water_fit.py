@@ -17,10 +17,7 @@ from aqualog.model.water_numbers import NAMES
 KMH = 1 / 3.6
 # from elsewhere: value and standard deviation
 ELSEWHERE = {
-    "v_anchor": (
-        120.5 * KMH,
-        1.5 * KMH,
-    ),  # 3 of 4 front wheels turn half as fast within 0.5 s at 118 km/h (C16), by simulation
+    "v_anchor": (120.5 * KMH, 1.5 * KMH),  # 3 of 4 front wheels at half speed in 0.5 s at 118 km/h (C16), by simulation
     "aspect_exponent": (0.45, 0.07),  # k: 0.5 by Horne's formula of 1986, 0.4 by the load in USF's (K)
     "contact_exponent": (4.0, 0.7),  # minor spin-downs grow in number from 98 to 106 km/h (C15); 4-6 by half the slope
     "h_track": (0.5e-3, 0.15e-3),  # below the least depth tested, 0.6 mm (D)
